@@ -18,7 +18,7 @@ namespace sdnn::agents {
 /// mask allows all actions.
 using ActionMask = std::span<const std::uint8_t>;
 
-/// The part of the next dimension, of n actions, which is taken from the mask of those left.
+/// Removes the next dimension's n entries from the mask of the remaining dimensions; returns them.
 inline ActionMask take_part(ActionMask& left, std::size_t n) noexcept {
   if (left.empty()) return {};
   const ActionMask part = left.first(n);
@@ -30,13 +30,14 @@ inline bool allows(ActionMask part, std::size_t action) noexcept {
   return part.empty() || part[action] != 0;
 }
 
-/// Whether these are zeros and ones, and one is allowed.
+/// Whether a dimension's mask has only zeros and ones, and allows an action.
 inline bool is_mask(ActionMask part) noexcept {
   return std::ranges::all_of(part, [](auto one) { return one <= 1; }) &&
          std::ranges::find(part, 1) != part.end();
 }
 
-/// An allowed one of n actions: that of number draw(how many are allowed) among them.
+/// Returns an allowed one of n actions; draw(k) returns a number below k, the number of allowed
+/// ones.
 template <class Draw>
 std::size_t draw_allowed(ActionMask part, std::size_t n, const Draw& draw) {
   if (part.empty()) return draw(n);

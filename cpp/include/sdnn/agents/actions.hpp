@@ -134,7 +134,7 @@ class Actions {
                          : static_cast<double>(draw_allowed(take_part(mask, n), n, below));
     }
   }
-  /// Whether what was drawn is allowed.
+  /// Whether a mask allows an action that `draw` returned.
   bool allows_drawn(std::span<const double> action, ActionMask mask) const noexcept {
     for (std::size_t d = 0; d < action.size() && !mask.empty(); ++d) {
       const ActionMask part = take_part(mask, n_actions_[d]);
@@ -174,8 +174,8 @@ class Actions {
   }
 
  private:
-  static constexpr double kFurthest = 1e300;  // of bounds: what lies between them stays finite
-  static constexpr double kLargestWhole = 9007199254740992.0;  // up to it doubles are whole
+  static constexpr double kFurthest = 1e300;  // largest bound: the width of a range is finite
+  static constexpr double kLargestWhole = 9007199254740992.0;  // 2^53: exact in doubles
 
   void check(std::size_t d) const {
     const std::string low_name = "action.low[" + std::to_string(d) + "]";

@@ -125,7 +125,7 @@ class ActorCritic : public IndexAgent<ActorCritic> {
     return critic().value_of(critic().sum(workspace_.critic, kOnlyAction));
   }
 
-  /// Reads a state for best_of: this takes the time and is for many threads, as values is.
+  /// Reads a state for best_of. Many threads may call it at once, with a workspace each.
   void read(std::span<const double> state, Workspace& workspace) const {
     critic().read(state, workspace.critic);
     actor_.read(workspace.critic.code(), workspace.actor);
@@ -156,7 +156,7 @@ class ActorCritic : public IndexAgent<ActorCritic> {
     }
     episode.has_acted = false;
     episode.dt = dt;
-    critic().read_next(state, episode.next);  // as acting left it
+    critic().read_next(state, episode.next);  // acting may have read it already
     std::swap(episode.present, episode.next);
     critic().read_next(next_state, episode.next);
     ++n_learned_;
@@ -204,7 +204,7 @@ class ActorCritic : public IndexAgent<ActorCritic> {
     td_.refine_unit(size_in_window, size, episodes_);
   }
 
-  /// Lists what is remembered; see core/state.hpp.
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.part("action_value", self.td_.readout());
@@ -322,7 +322,7 @@ class ActorCritic : public IndexAgent<ActorCritic> {
     episode.next_state.clear();
   }
 
-  /// Learns one step; `next` is V(s') in units.
+  /// Learns one step; `next` is V(s') in the critic's unit.
   void learn_step(Episode& episode, Action action, double reward, std::int64_t next,
                   ActionMask mask) {
     const bool is_dutch = n_environments() == 1;
@@ -344,7 +344,7 @@ class ActorCritic : public IndexAgent<ActorCritic> {
   core::Random ties_;
   detail::ErrorScale scale_;
   std::int64_t n_learned_ = 0;
-  std::int32_t rate_ = 0;        ///< the critic's alpha, kOne for 1
+  std::int32_t rate_ = 0;        ///< the critic's alpha, in units of 1 / kOne
   std::int32_t actor_rate_ = 0;  ///< the actor's
   Workspace workspace_;
   Episodes<Episode> episodes_;

@@ -247,7 +247,7 @@ inline void describe(const ControllerConfig& config, nlohmann::json& description
 /// A controller, and what else is in its file: spaces of Gymnasium, or a training in Python.
 class AgentFile {
  public:
-  /// To write a new file.
+  /// Takes a controller that is not in a file yet.
   explicit AgentFile(Controller controller_of_file) : controller(std::move(controller_of_file)) {
     detail::describe(controller.config(), content_.description);
   }

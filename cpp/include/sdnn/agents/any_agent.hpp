@@ -36,7 +36,7 @@ namespace sdnn::agents {
 using AnyAgent = std::variant<QLearning<approximators::SDNNC>, QLearning<approximators::RBFNetwork>,
                               FuzzyQLearning, QLambda, ActorCritic>;
 
-/// The memory of one reader of such an agent.
+/// The memory of one reader of an agent of any kind.
 template <class Agents>
 struct WorkspacesOf;
 template <class... Agent>
@@ -45,7 +45,7 @@ struct WorkspacesOf<std::variant<Agent...>> {
 };
 using AnyWorkspace = WorkspacesOf<AnyAgent>::type;
 
-/// The settings of its parts. Fuzzy rules belong to fuzzy Q-learning.
+/// The settings of an agent's approximator and learning rule. Fuzzy rules need fuzzy Q-learning.
 using AnyApproximatorConfig =
     std::variant<approximators::SDNNCConfig, approximators::RBFNetworkConfig,
                  approximators::FuzzyRulesConfig, approximators::LinearSDNNConfig>;
@@ -68,7 +68,7 @@ inline bool is_sdnn(const AnyApproximatorConfig& config) noexcept {
   return std::holds_alternative<approximators::SDNNCConfig>(config) || is_linear(config);
 }
 
-/// How many actions of a box there are in each dimension; 0: any.
+/// The number of actions into which each dimension of a box is divided; 0: real numbers.
 inline std::size_t n_actions_in_box(const AnyApproximatorConfig& config) {
   if (is_fuzzy(config)) return 0;
   int n = 1;
@@ -91,7 +91,8 @@ inline double power(int base, int exponent) {
   return product;
 }
 
-/// Code books are in no array of a file. Those of agents take less than their weights.
+/// Limits the memory of code books, which files do not contain: to the default limit of all tables,
+/// or to the memory of the weights, if that is larger.
 template <class Config>
 void expect_code_room(const Config& config, double weight_bytes, double n_dimensions) {
   const double n_bytes = coding::pattern_bytes_of(config, coding::n_bins_of(config));

@@ -53,7 +53,8 @@ namespace sdnn::agents {
 /// Thread safety: const functions may be called by many threads at once, with a workspace each.
 class Controller : public WithRates<Controller> {
  public:
-  /// The memory of one reader, once the warm-up is over: for that controller and what it becomes.
+  /// The memory of one reader, for the controller that made it after its warm-up, at any later
+  /// time.
   struct Workspace {
     AnyWorkspace agent;
     std::vector<double> state, action, held;
@@ -138,7 +139,7 @@ class Controller : public WithRates<Controller> {
     }
     readings_.forget(environment);
   }
-  /// The next acts without `explore` are those of another episode: none of its sensors was read.
+  /// Begins a greedy episode: later acts without `explore` use no earlier readings.
   void begin_greedy_episode(std::size_t environment = 0) {
     require_environment(environment);
     readings_.forget_greedy(environment);
@@ -173,7 +174,7 @@ class Controller : public WithRates<Controller> {
     return action_;
   }
 
-  /// For a reader. Requires that the warm-up is over.
+  /// Makes the memory of a reader. Requires that the warm-up is over.
   Workspace workspace() const {
     return {std::visit([](const auto& agent) { return AnyWorkspace(agent.workspace()); }, *agent_),
             std::vector<double>(state_.size()),
@@ -242,7 +243,7 @@ class Controller : public WithRates<Controller> {
         *agent_);
   }
 
-  /// The size of rewards, and the one that was too large to be learned.
+  /// The size of recent rewards, and the first reward that was too large to be learned.
   const RewardScale& reward_scale() const noexcept { return reward_scale_; }
   /// The number of learned transitions. Those of a warm-up count, unless the agent is on-policy.
   std::uint64_t n_learned() const noexcept {
@@ -316,7 +317,7 @@ class Controller : public WithRates<Controller> {
   friend class WithRates<Controller>;
   struct PrivateTag {};
 
-  static constexpr double kCaution = 1.5;  // of looking again and again
+  static constexpr double kCaution = 1.5;  // factor of evidence, as inputs are tested repeatedly
 
   Controller(ControllerConfig config, std::vector<coding::PatternTable> tables, PrivateTag)
       : config_(std::move(config)),
@@ -408,7 +409,7 @@ class Controller : public WithRates<Controller> {
     for (std::size_t d = 0; d < action.size(); ++d) indices_[d] = actions_.index_of(action[d], d);
   }
 
-  /// The action that is learned: in indices_, or the last one of fuzzy rules, which know no other.
+  /// The action to learn: the indices, or the last action of fuzzy rules, which can learn no other.
   std::span<const std::size_t> learned_action(const auto& /*agent*/, std::size_t) const {
     return indices_;
   }

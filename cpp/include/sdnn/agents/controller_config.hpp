@@ -20,7 +20,7 @@ struct ControllerConfig {
   ActionConfig action = {};
   int warm_up_steps = 1000;
 
-  /// The plain values.
+  /// The fields that are numbers.
   static constexpr auto fields() noexcept {
     return std::tuple(core::field("warm_up_steps", &ControllerConfig::warm_up_steps,
                                   "Random steps before learning, where ranges are not known.",

@@ -88,7 +88,7 @@ class EpsilonGreedy {
 
   const EpsilonGreedyConfig& config() const noexcept { return config_; }
 
-  /// Another probability of random actions. Throws std::invalid_argument outside [0, 1].
+  /// Sets the probability of random actions. Throws std::invalid_argument outside [0, 1].
   void set_epsilon(double epsilon) {
     core::require_in_range("epsilon", epsilon, 0.0, 1.0);
     config_.epsilon = epsilon;
@@ -155,7 +155,7 @@ class EpsilonGreedy {
     return one_of(values, static_cast<Value>(best - config_.tie_tolerance), ties);
   }
 
-  /// Returns the index of a value that is at least `least`, by the rule.
+  /// Returns the index of a value that is at least `least`, selected by the tie rule.
   template <class Value>
   std::size_t one_of(std::span<const Value> values, Value least, core::Random& ties) const {
     switch (config_.tie_rule) {
@@ -176,7 +176,8 @@ class EpsilonGreedy {
         std::ranges::count_if(values, [least](Value value) { return value >= least; }));
   }
 
-  /// The index of the n-th such value, from 0; there are more than n.
+  /// The index of value number n, from 0, of those that are at least `least`; there are more than
+  /// n.
   template <class Value>
   static std::size_t nth_of(std::span<const Value> values, Value least, std::uint64_t n) noexcept {
     constexpr std::size_t kAtOnce = 64;

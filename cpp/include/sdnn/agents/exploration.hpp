@@ -103,7 +103,7 @@ class Exploration {
         return policy_.random_action(n_allowed);
       });
     }
-    if (max_action_repeat_ > 1 && must_explore && start_steps_ == 0) {  // it searches
+    if (max_action_repeat_ > 1 && must_explore && start_steps_ == 0) {  // during a search
       episode.n_kept =
           static_cast<int>(repetitions_.below(static_cast<std::uint64_t>(max_action_repeat_ / 2)));
     } else if (max_action_repeat_ > 1) {
@@ -118,7 +118,7 @@ class Exploration {
   static void serialize(Self& self, Archive& archive) {
     archive.part("policy", self.policy_);
     archive.part("repetitions", self.repetitions_);
-    std::optional<int> n_random_left;  // none where there are no more
+    std::optional<int> n_random_left;  // absent after the last one
     if (self.n_random_left_ > 0) n_random_left = self.n_random_left_;
     archive.number("n_random_left", n_random_left);
     std::optional<int> n_ended;  // none where ends are not reported
@@ -177,7 +177,7 @@ class Exploration {
   int n_ended_ = 0;    ///< episodes that terminated, kMostEnded at most
 };
 
-/// The largest size of rewards: sums of some, and steps to them, stay finite.
+/// The largest size of a reward, with which sums of several rewards are finite.
 inline constexpr double kLargestReward = 1e300;
 
 /// Base of agents whose actions are indices, one for each dimension.
@@ -237,7 +237,7 @@ class IndexAgent : public WithRates<Agent> {
     return agent().best_of_read(workspace, agent().evaluation_ties(), mask);
   }
 
-  /// The action of the first dimension as a number in [-1, 1]: actions cut the range evenly.
+  /// The action of the first dimension as a number: actions are evenly spaced in [-1, 1].
   double normalized_action(Action action) const {
     return coding::action_value(action.front(), agent().n_actions(0), -1.0, 1.0);
   }
@@ -263,7 +263,7 @@ class IndexAgent : public WithRates<Agent> {
   void require_mask(const char* name, ActionMask mask) const {
     agents::require_mask(name, mask, agent().n_dimensions(), n_actions_of());
   }
-  /// Throws std::invalid_argument unless learn takes these.
+  /// Throws std::invalid_argument unless `learn` accepts these arguments.
   void require_transition(std::span<const double> state, Action action, double reward,
                           std::span<const double> next_state, ActionMask next_mask) const {
     core::require_unit_values("state", state, agent().n_inputs());

@@ -45,7 +45,7 @@ class FixedRate {
               std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
             }) {}
 #endif
-  /// With another clock, which must never go back.
+  /// Uses another clock, which must never go back.
   FixedRate(double hz, Clock clock, Sleep sleep)
       : hz_(hz), clock_(std::move(clock)), sleep_(std::move(sleep)) {
     core::require_in_range("hz", hz, 1e-3, 1e6);
@@ -69,18 +69,18 @@ class FixedRate {
         now = clock_();
       }
       if (now <= time_of(tick_ + 1)) break;
-      ++tick_;  // slept through it
+      ++tick_;  // the sleep lasted until after the tick
       skip(now);
     }
     n_skipped_ += tick_ - before - 1;
     return tick_;
   }
 
-  /// How often what followed a tick was not done by the next one.
+  /// The number of times that the work after a tick was not done by the next tick.
   std::int64_t n_misses() const noexcept { return n_misses_; }
-  /// Ticks that were left out because of it.
+  /// The number of ticks that were skipped after misses.
   std::int64_t n_skipped() const noexcept { return n_skipped_; }
-  /// By how many seconds the worst miss was too late.
+  /// The lateness of the worst miss in seconds.
   double worst_lateness() const noexcept { return worst_lateness_; }
 
  private:
@@ -94,7 +94,7 @@ class FixedRate {
     worst_lateness_ = std::max(worst_lateness_, now - time_of(tick_));
     const auto next = static_cast<std::int64_t>(std::ceil((now - start_) * hz_));
     tick_ = std::max(tick_, next);
-    if (time_of(tick_) < now) ++tick_;  // rounding
+    if (time_of(tick_) < now) ++tick_;  // the quotient may have been rounded
   }
 
   double hz_;

@@ -109,7 +109,7 @@ class FuzzyQLearning {
   Action act(std::span<const double> state, bool explore = true, std::size_t environment = 0,
              ActionMask /*mask*/ = {}) {
     if (!explore) {
-      static_cast<void>(dimensions_.front().last_action(environment));  // which must be there
+      static_cast<void>(dimensions_.front().last_action(environment));  // throws if there is none
       read(state, workspace_);
       return best_of(workspace_);
     }
@@ -129,7 +129,7 @@ class FuzzyQLearning {
     }
     return last_action_;
   }
-  /// Whether that act was in this state.
+  /// Whether the last exploring act was in this state.
   bool explored_in(std::span<const double> state, std::size_t environment = 0) const {
     return dimensions_.front().explored_in(state, environment);
   }
@@ -214,7 +214,7 @@ class FuzzyQLearning {
         archive.part(std::to_string(d), self.dimensions_[d]);
       }
     }
-    if constexpr (Archive::kReads) self.workspace_ = self.workspace();  // a copy's has no room
+    if constexpr (Archive::kReads) self.workspace_ = self.workspace();  // with reserved memory
   }
 
  private:

@@ -1,4 +1,4 @@
-/// States that have something of an episode's earlier observations.
+/// States that depend on earlier observations of an episode, too.
 #pragma once
 
 #include <algorithm>
@@ -25,9 +25,9 @@ namespace sdnn::agents {
 /// many inputs.
 class HistoryFilter {
  public:
-  /// Without any history, for observations of `n` inputs.
+  /// Makes a filter without any history, for observations of `n` inputs.
   explicit HistoryFilter(std::size_t n = 0) : circular_(n), n_symbols_(n) {}
-  /// Fitted to transitions. Shapes: (n_inputs,); 0: the input is a number.
+  /// Fits a history to transitions; n_symbols is 0 for inputs that are numbers. Shape: (n_inputs,).
   HistoryFilter(History history, const RandomExperience& experience, std::vector<int> n_symbols,
                 std::size_t n_dimensions)
       : circular_(experience.circular),
@@ -48,8 +48,8 @@ class HistoryFilter {
     if (kind_ == History::differences) find_largest_differences(experience);
   }
 
-  /// With the sizes that it will have: what is fitted is read, or never used. Requires that it is
-  /// not `automatic`.
+  /// Makes a filter with the sizes of a kind, whose fitted members are restored from a state or
+  /// never used. Requires that the kind is not `automatic`.
   HistoryFilter(History kind, std::vector<bool> circular, std::vector<int> n_symbols,
                 std::size_t n_dimensions)
       : circular_(std::move(circular)),
@@ -58,7 +58,7 @@ class HistoryFilter {
         kind_(kind),
         largest_(circular_.size(), 1.0) {}
 
-  /// Whether states have more inputs than observations where some are numbers.
+  /// Whether states have additional inputs for each number of an observation.
   static bool adds_inputs(History kind) noexcept {
     return kind == History::differences || kind == History::averages;
   }
@@ -82,7 +82,7 @@ class HistoryFilter {
   History kind() const noexcept { return kind_; }
   /// Whether states are the inputs of single observations.
   bool is_none() const noexcept { return kind_ == History::none; }
-  /// Numbers of the observations' inputs and of those of states.
+  /// The number of inputs of an observation; below, that of a state.
   std::size_t n_observed() const noexcept { return circular_.size(); }
   std::size_t n_inputs() const {
     return n_observed() + n_added() * static_cast<std::size_t>(n_numbers());
@@ -100,7 +100,7 @@ class HistoryFilter {
 
   /// The part of an episode that is remembered; empty before its first observation.
   using Memory = std::vector<double>;
-  /// Room for the next step of an episode.
+  /// Memory in which the next step of an episode is computed.
   struct Room {
     std::vector<double> last = {}, numbers = {}, features = {};
   };
@@ -207,8 +207,8 @@ class HistoryFilter {
       kind = static_cast<History>(number);
     }
   }
-  /// Lists what was fitted; see core/state.hpp. What it reads into has the kind, and the task's
-  /// inputs.
+  /// Lists the fitted members that are saved; see core/state.hpp. They are restored into a filter
+  /// of the same kind and inputs.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     if constexpr (Archive::kReads) {
@@ -262,7 +262,7 @@ class HistoryFilter {
     find_numbers(inputs, numbers);
     return numbers;
   }
-  /// Writes the inputs that are no symbols; of rows, those of each.
+  /// Writes the inputs that are not symbols, of one row or of several.
   void find_numbers(std::span<const double> inputs, std::vector<double>& numbers) const {
     numbers.clear();
     for (std::size_t i = 0; i < inputs.size(); ++i) {

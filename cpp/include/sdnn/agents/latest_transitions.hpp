@@ -9,7 +9,7 @@
 
 namespace sdnn::agents {
 
-/// Remembers the last n_steps of 2, 4, 8, ... times n_steps transitions; else nothing.
+/// Remembers the last n_steps transitions before each of the times 2, 4, 8, ... times n_steps.
 class LatestTransitions {
  public:
   /// `empty` remembers n_steps transitions, which are the first ones of all.
@@ -49,7 +49,7 @@ class LatestTransitions {
  private:
   static constexpr std::uint64_t kMostSeen = std::uint64_t{1} << 62;
 
-  /// The first of the times that is not over.
+  /// The next of these times, in transitions.
   std::uint64_t next_time() const noexcept {
     std::uint64_t time = 2 * n_steps_;
     while (time <= n_seen_) time *= 2;

@@ -36,7 +36,7 @@ class NStepBuffer {
 
   std::size_t size() const noexcept { return n_steps_; }
   bool is_full() const noexcept { return n_steps_ == steps_.size(); }
-  /// Where the newest step led.
+  /// The state after the newest step.
   std::span<const double> next_state() const noexcept { return next_state_; }
   /// Whether `state` is the state after the newest step, or the buffer is empty.
   bool is_continued_by(std::span<const double> state) const noexcept {
@@ -66,7 +66,7 @@ class NStepBuffer {
     return value;
   }
 
-  /// Takes the oldest one out; valid until the next add. Requires one.
+  /// Removes and returns the oldest step, valid until the next add. Requires that there is a step.
   const Step& take_oldest() noexcept {
     assert(n_steps_ > 0);
     const Step& oldest = steps_[first_];
@@ -75,7 +75,7 @@ class NStepBuffer {
     return oldest;
   }
 
-  /// Whether all of them, the oldest first, satisfy a condition.
+  /// Whether all steps, the oldest first, satisfy a condition.
   template <class Condition>
   bool each_is(const Condition& condition) const {
     for (std::size_t i = 0; i < n_steps_; ++i) {

@@ -12,7 +12,7 @@
 
 namespace sdnn::agents {
 
-/// Selects what states have of the observations before the present one.
+/// Selects how states depend on the observations before the present one.
 enum class History {
   none,         ///< nothing
   differences,  ///< the difference of each input from the last observation, a further input

@@ -176,7 +176,7 @@ class ObservationScale {
     }
     const double u = (observation[i] - low_[i]) / (high_[i] - low_[i]);
     if (input.kind == ObservedKind::variable) return u > -1.0 ? std::min(u, 2.0) : -1.0;
-    return std::isfinite(u) ? u - std::floor(u) : 0.0;  // beyond the range of numbers
+    return std::isfinite(u) ? u - std::floor(u) : 0.0;  // the quotient may overflow
   }
 
   std::vector<double> low_, high_;

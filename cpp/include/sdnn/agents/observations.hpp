@@ -84,7 +84,8 @@ class Observations {
   std::span<const double> high() const noexcept { return ranges_.high; }
   std::span<const ObservedInput> inputs() const noexcept { return inputs_; }
   std::size_t n_inputs() const noexcept { return inputs_.size(); }
-  /// Whether inputs are to be chosen by relevance: never from one, which is given twice, or two.
+  /// Whether inputs are selected by relevance. One input, which may be repeated, or two are all
+  /// kept.
   bool has_choice() const { return may_leave_out_inputs(pairs_); }
   /// Which inputs are angles.
   std::vector<bool> circular() const {
@@ -113,7 +114,7 @@ class Observations {
     }
     return n_symbols;
   }
-  /// The readings of episodes that have not begun.
+  /// The last readings before any episode has begun: none.
   LastReadings last_readings() const {
     return {config_.missing == Missing::hold, n_variables(), config_.symbols};
   }
@@ -204,7 +205,7 @@ class Observations {
     return all;
   }
 
-  /// Lists what was fitted; see core/state.hpp.
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     if (self.running_) {
@@ -333,7 +334,7 @@ class Observations {
   std::pair<double, double> fitted_range(std::vector<double> seen, std::size_t i,
                                          double headroom) const;
 
-  /// Takes the ranges as they are now.
+  /// Scales by the running ranges as they are now.
   void follow() {
     for (std::size_t i = 0; i < n_variables(); ++i) {
       if (roles_[i] != Role::number || is_one_of(pairs_, i)) continue;

@@ -64,7 +64,7 @@ inline Preset robust_preset(int n_inputs) {
   return {.approximator = {.n_inputs = n_inputs, .n_actions = 61}, .learning = {.n_steps = 5}};
 }
 
-/// A preset, as users know it.
+/// A preset with the name and the title by which users select it.
 template <class Preset>
 struct Named {
   const char* name;

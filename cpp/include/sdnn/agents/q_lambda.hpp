@@ -124,7 +124,7 @@ class QLambda : public IndexAgent<QLambda> {
     return workspace.values[d];
   }
 
-  /// Reads a state for best_of: this takes the time and is for many threads, as values is.
+  /// Reads a state for best_of. Many threads may call it at once, with a workspace each.
   void read(std::span<const double> state, Workspace& workspace) const {
     readout().read(state, workspace.readout);
     take_values(workspace.readout, workspace.values, true);
@@ -306,7 +306,7 @@ class QLambda : public IndexAgent<QLambda> {
     readout().read_next(state, episode.next);
     take_values(episode.next, workspace_.values, false);
   }
-  /// Values in units, which are exact and in the same order.
+  /// Writes values in units of the readout: integers, which are exact and in the same order.
   void take_values(Readout::Workspace& read, std::vector<std::vector<double>>& values,
                    bool averaged) const {
     for (std::size_t d = 0; d < n_dimensions(); ++d) {
@@ -321,7 +321,7 @@ class QLambda : public IndexAgent<QLambda> {
     const EpsilonGreedy& policy = exploration_.policy();
     const double tolerance =
         std::ldexp(policy.config().tie_tolerance, -readout().exponent().value_or(0));
-    // Finite, so that actions that are not allowed never tie.
+    // Masked actions have a value of -infinity, with which they tie only at an infinite tolerance.
     const double whole = std::floor(std::min(tolerance, kMostTolerance));
     for (std::size_t d = 0; d < workspace.action.size(); ++d) {
       const std::span<const double> row = workspace.values[d];
@@ -363,7 +363,7 @@ class QLambda : public IndexAgent<QLambda> {
     episode.waits = false;
   }
 
-  /// Learns one step; `next` is Q' in units.
+  /// Learns one step; `next` is Q' in units of the readout.
   void correct(Episode& episode, std::int64_t next) {
     const bool is_dutch = config_.traces == TraceKind::dutch && n_environments() == 1;
     const auto error =
@@ -376,7 +376,7 @@ class QLambda : public IndexAgent<QLambda> {
   Exploration exploration_;
   std::int64_t n_learned_ = 0;
   std::int64_t n_logged_ = 0;  ///< of these, steps that the agent did not take; 0 after a reward
-  std::int32_t rate_ = 0;      ///< alpha, kOne for 1
+  std::int32_t rate_ = 0;      ///< alpha, in units of 1 / kOne
   Workspace workspace_;
   Episodes<Episode> episodes_;
 };

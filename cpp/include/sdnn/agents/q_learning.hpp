@@ -108,7 +108,7 @@ class QLearning : public IndexAgent<QLearning<Q>> {
     if (episode.buffer.size() > 0) learn_waiting(episode);
   }
 
-  /// Lets the approximators write to the memory that they will need, where they know how.
+  /// Lets the approximators write to the memory that they will need, so that first steps are fast.
   void warm_caches()
     requires requires(Q& q, typename Q::Workspace& workspace) { q.warm_caches(workspace); }
   {
@@ -146,7 +146,7 @@ class QLearning : public IndexAgent<QLearning<Q>> {
     return row;
   }
 
-  /// Reads a state for best_of: this takes the time and is for many threads, as values is.
+  /// Reads a state for best_of. Many threads may call it at once, with a workspace each.
   void read(std::span<const double> state, Workspace& workspace) const {
     for (std::size_t d = 0; d < n_dimensions(); ++d) read(state, workspace, d, true);
   }
@@ -200,7 +200,7 @@ class QLearning : public IndexAgent<QLearning<Q>> {
         [&](auto& episode) { serialize_episode(self, episode, archive); });
     if constexpr (Archive::kReads) {
       self.apply_rates();
-      self.workspace_ = self.workspace();  // a copy's has no room
+      self.workspace_ = self.workspace();  // with reserved memory, which copies do not keep
     }
   }
 
@@ -208,7 +208,7 @@ class QLearning : public IndexAgent<QLearning<Q>> {
   friend class WithRates<QLearning>;
   friend class IndexAgent<QLearning>;
 
-  /// Whether numbers that stand for values may be read in their place.
+  /// Whether counts of firing units, which may have the order of the values, can be read instead.
   static constexpr bool kCounts = approximators::CountedActionValue<Q>;
   static constexpr bool kHasRange = requires(Q& q) { q.set_output_range(0.0, 1.0); };
 
@@ -276,7 +276,7 @@ class QLearning : public IndexAgent<QLearning<Q>> {
     }
     static_cast<void>(values(state, workspace, d, averaged));
   }
-  /// Makes those of actions that are not allowed lower than all others.
+  /// Makes the values or counts of actions that are not allowed lower than all others.
   void exclude(ActionMask mask, Workspace& workspace, std::size_t d) const {
     if constexpr (kCounts) {
       if (networks_[d].values_rise()) return workspace.networks[d].counts().exclude(mask);
@@ -291,7 +291,7 @@ class QLearning : public IndexAgent<QLearning<Q>> {
     }
     return best_value(std::span<const double>(workspace.values[d]));
   }
-  /// An action that has it, or ties with those that have.
+  /// Returns an action with the largest value, or with a value that ties with it.
   std::size_t best_in(const Workspace& workspace, std::size_t d, core::Random& ties) const {
     const EpsilonGreedy& policy = exploration_.policy();
     if constexpr (kCounts) {
@@ -332,7 +332,7 @@ class QLearning : public IndexAgent<QLearning<Q>> {
   void learn_oldest(NStepBuffer& buffer, double value) {
     const double target = buffer.return_of_oldest(value, config_.discount);
     const NStepBuffer::Step& oldest = buffer.take_oldest();
-    if (n_dimensions() == 1) {  // not by the error, which has a rounding
+    if (n_dimensions() == 1) {  // passes the target on: value plus error would be rounded
       update(oldest, 0, target);
       return;
     }

@@ -22,7 +22,7 @@ struct RangeUse {
   double share_beyond;  ///< how often it was outside the range
 };
 
-/// Notes one in eight observations in the mean, of these the last 256 or so.
+/// Notes about one in eight observations, and remembers about the last 256 notes.
 class RangeNotes {
  public:
   explicit RangeNotes(std::size_t n_variables)

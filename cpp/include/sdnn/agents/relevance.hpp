@@ -102,7 +102,7 @@ class Relevance {
   }
 
  private:
-  static constexpr std::size_t kLeast = 100;             // fewer say nothing
+  static constexpr std::size_t kLeast = 100;             // transitions: fewer are no evidence
   static constexpr std::size_t kMostWithoutChance = 24;  // inputs: more need more evidence
   static constexpr std::size_t kLeastDeciding = 8;       // values that evidence rests on
   static constexpr std::size_t kBins = 8;
@@ -112,7 +112,7 @@ class Relevance {
   static constexpr std::size_t kRewards = 20;
   static constexpr double kDiscount = 0.95;
   static constexpr double kFactor = 1.5;
-  static constexpr double kFactorOfPairs = 2.0;  // there are more of them
+  static constexpr double kFactorOfPairs = 2.0;  // of evidence: there are more pairs than inputs
 
   using Bins = std::vector<std::uint8_t>;
 
@@ -125,7 +125,7 @@ class Relevance {
     std::vector<detail::BinaryGroup> groups = {};
     std::vector<std::vector<std::size_t>> group_of = {};  ///< of each input; empty: it is alone
 
-    /// Whether what an input decides, or what decides it, must stand out of n^2 comparisons.
+    /// Whether dependences of an input need more evidence because there are many comparisons.
     bool is_strict(std::size_t i) const {
       return bins.size() > kMostWithoutChance || !group_of[i].empty();
     }

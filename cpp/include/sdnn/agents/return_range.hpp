@@ -118,16 +118,16 @@ class ReturnRange {
   static constexpr std::size_t kMostReturns = 256;
   static constexpr std::uint64_t kFewReturns = 32;
   static constexpr std::uint64_t kReturnsPerLife = 2 * kMostReturns;
-  static constexpr std::size_t kLow = 20,
-                               kHigh = 50;  // of so many the lowest, highest are left out
+  // The lowest of every 20 returns and the highest of every 50 are left out.
+  static constexpr std::size_t kLow = 20, kHigh = 50;
   static constexpr double kHeadroom = 0.25;
-  static constexpr double kLargest = 1e300;            // of sums
-  static constexpr double kFurthest = 2.0 * kLargest;  // of the ends, which stay within 5/3 of it
+  static constexpr double kLargest = 1e300;            // largest sum of rewards
+  static constexpr double kFurthest = 2.0 * kLargest;  // beyond all ends of ranges of such sums
 
   static double clipped(double sum) noexcept { return std::clamp(sum, -kLargest, kLargest); }
   static bool is_sum(double number) noexcept { return number >= -kLargest && number <= kLargest; }
 
-  /// Returns from one that is remembered to the next one.
+  /// The number of returns from one that is remembered to the next one that is.
   static std::uint64_t returns_between(std::uint64_t n_returns) noexcept {
     return std::max<std::uint64_t>(n_returns / kReturnsPerLife, 1);
   }
@@ -136,7 +136,7 @@ class ReturnRange {
     return static_cast<std::size_t>(2.0 / std::max(1.0 - discount_, 0.004));
   }
 
-  /// Grows by a quarter more than it must, so that it grows rarely.
+  /// Widens the range to contain a sum, and by a quarter more, so that it is rarely widened.
   bool hold(double sum) noexcept {
     if (sum >= low_ && sum <= high_) return false;
     if (sum > high_) {
@@ -147,7 +147,7 @@ class ReturnRange {
     return true;
   }
 
-  /// Computes the returns of the first n_known rewards; `are_all` that the episode has.
+  /// Computes the returns of the first n_known rewards; with `are_all` the episode has no others.
   void note_returns(const Rewards& rewards, std::size_t n_known, bool are_all) {
     const double width = n_returns_ < kFewReturns ? kLargest : high_ - low_;
     const double low = clipped(low_ - width), high = clipped(high_ + width);

@@ -26,8 +26,7 @@ namespace sdnn::agents {
 class RewardScale {
  public:
   RewardScale() = default;
-  /// Starts with the size of the known rewards: that which three quarters of those that are not 0
-  /// do not exceed.
+  /// Starts with the upper quartile of the sizes of known rewards, without those that are 0.
   explicit RewardScale(std::span<const double> rewards) {
     std::vector<std::int32_t> sizes;
     for (const double reward : rewards) {

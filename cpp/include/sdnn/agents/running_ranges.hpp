@@ -47,7 +47,7 @@ class RunningRanges {
     return {mean - kDeviations * deviation, mean + kDeviations * deviation};
   }
 
-  /// Lists what is remembered; see core/state.hpp.
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     const std::size_t n = self.counts_.size();

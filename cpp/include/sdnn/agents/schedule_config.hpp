@@ -168,7 +168,7 @@ class WithRates {
     rates_.set_epsilon = epsilon;
     apply([epsilon](auto& other) { other.set_epsilon(epsilon); });
   }
-  /// Takes over those of another agent.
+  /// Takes over the rates of another agent.
   void set_rates(const Rates& rates) {
     rates_ = rates;
     apply([&rates](auto& other) { other.set_rates(rates); });

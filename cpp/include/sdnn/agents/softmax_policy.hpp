@@ -34,10 +34,10 @@ class SoftmaxPolicy {
 
   /// The rates of a step of learning.
   struct Step {
-    std::int32_t error = 0;    ///< the normalized TD error, kErrorOne for 1
-    std::int32_t rate = 0;     ///< of the error, 2^16 for 1
-    std::int32_t entropy = 0;  ///< the weight of the entropy's gradient, 2^16 for 1
-    std::int32_t decay = 0;    ///< gamma lambda, kDecayOne for 1
+    std::int32_t error = 0;    ///< the normalized TD error, in units of 1 / kErrorOne
+    std::int32_t rate = 0;     ///< of the error, in units of 2^-16
+    std::int32_t entropy = 0;  ///< the weight of the entropy's gradient, in units of 2^-16
+    std::int32_t decay = 0;    ///< gamma lambda, in units of 1 / kDecayOne
   };
   static constexpr int kErrorBits = 12;
   static constexpr std::int32_t kErrorOne = 1 << kErrorBits;
@@ -64,7 +64,7 @@ class SoftmaxPolicy {
   }
   Trace trace() const { return {n_rows_, n_columns_}; }
 
-  /// Computes the preferences in the state of a code, which takes the time.
+  /// Computes the preferences in the state of a code: the slow part of an act.
   void read(const Code& code, Workspace& workspace) const {
     constexpr std::size_t kAtOnce = 64;
     const std::int32_t* rows[kAtOnce];
@@ -124,7 +124,7 @@ class SoftmaxPolicy {
   void learn(const Code& code, const Workspace& workspace, std::span<const std::size_t> action,
              Trace& trace, const Step& step) {
     const std::int64_t n = std::max<std::int64_t>(1, code.n_active());
-    const std::int64_t rate = (std::int64_t{step.rate} << 12) / n;  // 2^28 for 1
+    const std::int64_t rate = (std::int64_t{step.rate} << 12) / n;  // in units of 2^-28
     const std::int64_t along_trace =
         approximators::scaled(step.error, rate, kErrorBits + 28 - n_unit_bits_);
     int n_bits = 0;
@@ -155,7 +155,7 @@ class SoftmaxPolicy {
     }
   }
 
-  /// Lists the state; see core/state.hpp.
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.fixed("weights", {self.n_rows_, self.n_columns_}, self.weights_);

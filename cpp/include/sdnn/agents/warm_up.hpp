@@ -26,7 +26,7 @@ namespace sdnn::agents {
 /// steps would stay near the start. Each environment has a separate action.
 class WarmUp {
  public:
-  /// A transition as it came: observation and action in the units of the task.
+  /// A transition, with observations and the action in the units of the task.
   struct Step {
     bool begins;  ///< an episode
     std::size_t environment;
@@ -39,7 +39,7 @@ class WarmUp {
     double dt = 1.0;     ///< its duration in usual steps
   };
 
-  /// Where an agent cannot learn any transition, a warm-up is not over between acting and learning.
+  /// Without `learns_any_transition` the warm-up does not end while an action is not learned yet.
   WarmUp(std::size_t n_variables, std::size_t n_dimensions, std::size_t n_steps, std::uint64_t seed,
          bool learns_any_transition)
       : n_variables_(n_variables),
@@ -55,7 +55,7 @@ class WarmUp {
   void set_n_environments(std::size_t n) {
     episodes_.resize(n, [this] { return Episode(n_dimensions_); });
   }
-  /// How many environments there are, or were when a transition was remembered.
+  /// The number of environments now, or when a transition was remembered, whichever is larger.
   std::size_t n_in_all() const {
     std::size_t n = n_environments();
     for (const std::int64_t i : environments_) n = std::max(n, static_cast<std::size_t>(i) + 1);

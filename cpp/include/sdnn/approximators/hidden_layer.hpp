@@ -204,7 +204,7 @@ class HiddenLayer {
   /// The bytes of a block: its columns, and a column of zeros, for the padding of lists of columns.
   std::size_t block_bytes() const noexcept { return (n_columns_ + 1) * kBlockUnits; }
 
-  /// Adds sign * the weights of the columns to out_i; the columns may have bits.
+  /// Adds sign * the weights of the columns to out_i. `bits` are the same columns, or empty.
   void add_signed(std::span<const std::uint32_t> columns, std::span<const std::uint64_t> bits,
                   int sign, std::span<std::int32_t> out) const {
     if (columns.size() > ColumnPlaces::kMost) bits = {};
@@ -226,7 +226,7 @@ class HiddenLayer {
     }
   }
 
-  /// Adds the high bytes. If many columns have them, selecting these would cost more than it saves.
+  /// Adds the high bytes, only of columns that have them unless these are many.
   void add_high_bytes(std::size_t block, const ColumnPlaces& all, const Listed& listed,
                       std::span<const std::uint64_t> bits, int sign, std::int32_t* sums) const {
     const int group = high_group_of_block_[block];

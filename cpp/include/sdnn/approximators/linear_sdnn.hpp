@@ -53,8 +53,8 @@ class LinearSDNN {
   struct Step {
     std::int64_t error = 0;       ///< the factor of the trace, in units
     std::int64_t correction = 0;  ///< the factor of the code, in units
-    std::int32_t rate = 0;        ///< alpha, 2^16 for 1
-    std::int32_t decay = 0;       ///< gamma lambda, kDecayOne for 1
+    std::int32_t rate = 0;        ///< alpha, in units of 2^-16
+    std::int32_t decay = 0;       ///< gamma lambda, in units of 1 / kDecayOne
     bool is_dutch = true;         ///< else the trace is replaced
   };
 
@@ -277,7 +277,8 @@ class LinearSDNN {
   /// error along the trace, minus rate / n times the correction along the code, where n is the
   /// number of weights that contribute to Q(s, a). Returns the number of doublings of the unit.
   int learn(const Code& code, std::span<const std::size_t> action, Trace& trace, const Step& step) {
-    const std::int64_t rate = (std::int64_t{step.rate} << 12) / n_weights_of(code);  // 2^28 for 1
+    const std::int64_t rate =
+        (std::int64_t{step.rate} << 12) / n_weights_of(code);  // in units of 2^-28
     RowStep row_step{
         .decay = step.decay, .gain = 0, .replace = 0, .step = 0, .shift = 1, .correction = 0};
     std::int32_t gain = kTraceOne;

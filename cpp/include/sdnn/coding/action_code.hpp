@@ -53,7 +53,7 @@ class ActionCode {
   std::vector<std::uint32_t> first_units_;
 };
 
-/// The physical value of `action` when the range [low, high] is cut evenly into `n_actions`.
+/// The physical value of `action` if `n_actions` values are evenly spaced from low to high.
 ///
 /// Source: section 4.1, the 601 torques -10, -10 + 1/30, ..., 10 N m.
 inline double action_value(std::size_t action, std::size_t n_actions, double low,

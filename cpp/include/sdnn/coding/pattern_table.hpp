@@ -64,7 +64,7 @@ class PatternTable {
 
   std::size_t n_bins() const noexcept { return n_bins_; }
   std::size_t n_units() const noexcept { return n_units_; }
-  /// Words of a pattern.
+  /// The number of words of a pattern.
   std::size_t n_words() const noexcept { return n_words_; }
   /// The words of all patterns, one pattern after the other.
   const core::BitWord* words() const noexcept { return words_.data(); }
@@ -73,7 +73,7 @@ class PatternTable {
     assert(bin < n_bins_);
     return {words_.data() + bin * n_words_, n_units_};
   }
-  /// +1 or -1.
+  /// The sign of a unit in a pattern, +1 or -1.
   int sign(std::size_t bin, std::size_t unit) const noexcept { return (*this)[bin][unit] ? 1 : -1; }
   void set(std::size_t bin, std::size_t unit, bool on = true) noexcept {
     assert(bin < n_bins_ && unit < n_units_);

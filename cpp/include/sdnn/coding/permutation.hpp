@@ -50,7 +50,7 @@ inline void require_permutation(const Permutation& permutation, std::size_t n_un
   }
 }
 
-/// A table with every pattern permuted. Throws std::invalid_argument as above.
+/// A table with every pattern permuted. Throws std::invalid_argument as require_permutation does.
 inline PatternTable permuted(const PatternTable& table, const Permutation& permutation) {
   require_permutation(permutation, table.n_units());
   PatternTable result(table.n_bins(), table.n_units());

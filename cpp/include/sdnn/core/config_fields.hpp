@@ -37,7 +37,7 @@ constexpr Bounds above_up_to(double low, double high) noexcept {
   return {.low = low, .high = high, .excludes_low = true};
 }
 
-/// An enumeration with words: `words_of(value)` beside it gives them in the order of its values.
+/// An enumeration whose values have names: `words_of(value)` returns them in the order of values.
 template <class Enum>
 concept HasWords = std::is_enum_v<Enum> && requires(Enum value) {
   { words_of(value)[0] } -> std::convertible_to<std::string_view>;

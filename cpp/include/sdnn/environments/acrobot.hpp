@@ -21,7 +21,7 @@ struct StepResult {
   bool truncated;
 };
 
-/// Reward and episode end after the `decisions`-th decision of an episode led to `state`.
+/// The reward and the end of the episode when decision number `decisions` has led to `state`.
 ///
 /// The goal overrides the penalty, which is tested at the decision instant only.
 inline StepResult result_of(const AcrobotConfig& config, const AcrobotState& state, bool goal,

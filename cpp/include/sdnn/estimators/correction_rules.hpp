@@ -91,7 +91,7 @@ class PDeltaRule {
     const auto add = [&](std::size_t i) {
       corrections.push_back({static_cast<std::uint32_t>(first_unit + i), direction});
     };
-    if (n_corrected <= kScans) {  // the least key, then the next one, ...
+    if (n_corrected <= kScans) {  // searches for the least key, then for the next one, and so on
       const std::size_t n_before = corrections.size();
       std::int32_t key = rank_units(potentials, group_size_, deficit < 0, n_index_bits_,
                                     distance_limit_, keys_.data());
@@ -100,7 +100,7 @@ class PDeltaRule {
         if (--left == 0) return;
         key = least_above(keys_.data(), group_size_, key);
       }
-      corrections.resize(n_before);  // too far for a key
+      corrections.resize(n_before);  // keys do not distinguish larger distances
     }
     ranked_.clear();
     for (std::size_t i = 0; i < group_size_; ++i) {

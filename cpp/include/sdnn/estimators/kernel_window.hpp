@@ -123,7 +123,7 @@ class KernelWindow {
     if (!is_exact || n_replaced_ >= kMostReplaced) rebuild();
   }
 
-  /// Lists what is remembered; see core/state.hpp.
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     const std::size_t n = self.n_inputs(), n_outputs = self.n_outputs(), size = self.capacity_;
@@ -162,7 +162,7 @@ class KernelWindow {
     }
   }
 
-  /// Writes the kernels of inputs and all samples.
+  /// Writes the kernel between scaled inputs and each sample.
   void kernels(std::span<const double> scaled, std::span<double> out) const noexcept {
     const std::size_t n = n_inputs();
     const double root = std::sqrt(static_cast<double>(std::max<std::size_t>(n, 1)));
@@ -176,7 +176,7 @@ class KernelWindow {
     for (double& value : out) value = core::exp(value);
   }
 
-  /// Writes the product of the inverse and the kernels.
+  /// Writes the product of the inverse matrix and the kernels.
   void solve(std::span<const double> kernel, std::span<double> out) const noexcept {
     std::ranges::fill(out, 0.0);
     for (std::size_t row = 0; row < kernel.size(); ++row) {
@@ -221,7 +221,7 @@ class KernelWindow {
     return variance > ridge_ / 2.0 && variance <= 1.0 + ridge_ && factor_removed >= 0.0;
   }
 
-  /// Inverts the matrix of all samples anew.
+  /// Computes the inverse matrix anew from all samples.
   void rebuild() {
     const std::size_t n_samples = std::exchange(n_samples_, 0);
     n_replaced_ = 0;

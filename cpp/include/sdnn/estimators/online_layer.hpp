@@ -68,7 +68,7 @@ class OnlineLayer {
                   rule.n_units());
     TrainingCount count;
     done_.clear();
-    struct Undoes {  // unless all corrections succeed
+    struct Undoes {  // undoes the corrections unless all of them succeed
       OnlineLayer& layer;
       std::span<const std::int32_t> bins;
       bool is_done = false;

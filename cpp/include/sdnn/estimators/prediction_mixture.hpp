@@ -93,7 +93,7 @@ class PredictionMixture {
     count_ = kDiscount * count_ + 1.0;
   }
 
-  /// Lists what is remembered; see core/state.hpp.
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.number("count", self.count_);

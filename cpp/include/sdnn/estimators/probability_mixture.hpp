@@ -66,7 +66,7 @@ class ProbabilityMixture {
     }
   }
 
-  /// Lists what is remembered; see core/state.hpp.
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.fixed("losses", {self.losses_.size()}, self.losses_);

@@ -123,7 +123,7 @@ class RecursiveLeastSquares {
     update_covariance(gains, factor);
   }
 
-  /// Lists what is remembered; see core/state.hpp.
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     const std::size_t n = self.n_inputs(), n_outputs = self.n_outputs(), n_columns = n + 1;
@@ -159,7 +159,7 @@ class RecursiveLeastSquares {
   static constexpr double kMargin = 0.2;          ///< share of the range of targets
   static constexpr double kFarthest = 1e6;        ///< half widths from the middle
 
-  /// The input within its range and the width of the range on either side.
+  /// Clips an input to its range, extended by its width on either side.
   double clipped(std::size_t i, double input) const noexcept {
     const double width = high_[i] - low_[i];
     return std::clamp(detail::finite(input), detail::finite(low_[i] - width),
@@ -188,14 +188,14 @@ class RecursiveLeastSquares {
     }
   }
 
-  /// The output within the range of the targets and its margin.
+  /// The output, clipped to the range of the targets with its margin.
   double output(std::size_t o, std::span<const double> columns) const noexcept {
     const double margin = kMargin * (highest_[o] / 2.0 - lowest_[o] / 2.0) * 2.0;
     return std::clamp(unlimited_output(o, columns), detail::finite(lowest_[o] - margin),
                       detail::finite(highest_[o] + margin));
   }
 
-  /// The output on which learning is based.
+  /// The output before it is clipped, on which learning is based.
   double unlimited_output(std::size_t o, std::span<const double> columns) const noexcept {
     const double* const weights = &weights_[o * columns.size()];
     double sum = 0.0;

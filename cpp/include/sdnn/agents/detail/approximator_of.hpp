@@ -35,7 +35,8 @@ inline bool is_table(const ControllerConfig& config, const Observations& observa
          n <= kMostStates;
 }
 
-/// How many bins an input that is no symbol has; with tables, each input. None without codes.
+/// The number of bins of an input that is not a symbol or, with tables, of each input; empty for
+/// approximators without codes.
 inline std::vector<std::size_t> n_bins_of_inputs(const AnyApproximatorConfig& approximator,
                                                  const std::vector<coding::PatternTable>& tables) {
   std::vector<std::size_t> n_bins;

@@ -30,7 +30,8 @@ inline std::vector<double> column(std::span<const double> seen, std::size_t n_va
   return values;
 }
 
-/// Two variables where both were read, before a step and after it: halves as those of `seen`.
+/// The readings of two variables where both are present before and after a step. The first half is
+/// from before the steps and the second half from after them, as in `seen`.
 inline std::pair<std::vector<double>, std::vector<double>> columns(std::span<const double> seen,
                                                                    std::size_t n_variables,
                                                                    std::size_t i, std::size_t j) {
@@ -70,7 +71,7 @@ inline bool is_around_circle(const std::vector<double>& cosines, const std::vect
   const std::size_t n = cosines.size() / 2;
   if (n < kFewest) return false;
   const auto mean_of = [](std::size_t count, const auto& term) {
-    double sum = 0.0;  // in this order on every machine
+    double sum = 0.0;  // a plain loop adds in the same order on every machine
     for (std::size_t t = 0; t < count; ++t) sum += term(t);
     return sum / static_cast<double>(count);
   };

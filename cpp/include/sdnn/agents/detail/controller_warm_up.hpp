@@ -61,7 +61,7 @@ inline RandomExperience experience_of(const Observations& fitted, const WarmUp& 
   return experience;
 }
 
-/// The number of inputs that came first, where others were added; else 0.
+/// The number of inputs before others were added; 0 if none was added.
 inline std::size_t n_first_inputs(const Observations& observations) noexcept {
   const std::size_t n = observations.n_first_inputs();
   return n < observations.n_inputs() ? n : 0;
@@ -74,8 +74,9 @@ inline WarmUp Controller::new_warm_up() const {
           config_.seed, !is_on_policy(config_.learning)};
 }
 
-/// Makes the agent: all ranges are known. Of a state that is read, sizes are compared first. Throws
-/// what the approximator does, and then nothing has changed.
+/// Makes the agent when all ranges are known. With a `reader`, compares the sizes of the saved
+/// state before it allocates memory. Throws the errors of the approximator; then nothing has
+/// changed.
 inline void Controller::fit(Observations observations, detail::LastStates last_states,
                             const core::StateReader* reader) {
   last_states.restart(observations, n_dimensions());
@@ -218,7 +219,7 @@ inline void Controller::add_inputs() {
   identity_ = core::Identity();  // readers have workspaces for fewer inputs
 }
 
-/// Learns a transition of the warm-up, after which there were these readings.
+/// Learns a transition of the warm-up; `readings` are the last ones before it, and are updated.
 inline void Controller::replay(const WarmUp::Step& step, LastReadings& readings) {
   if (step.begins) {
     begin_learned_episode(step.environment);

@@ -48,7 +48,7 @@ class ErrorScale {
     return static_cast<std::int32_t>(error < 0 ? -quotient : quotient);
   }
 
-  /// Lists the state; see core/state.hpp.
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.number("mean_square", self.mean_square_);

@@ -61,9 +61,9 @@ class FuzzyDimension {
   std::span<const std::size_t> picked(std::size_t environment = 0) const {
     return episodes_.of(environment).picked;
   }
-  /// The number of that act.
+  /// The number in [-1, 1] of the last exploring act.
   double last_action(std::size_t environment = 0) const { return episodes_.of(environment).action; }
-  /// Whether that act was in this state.
+  /// Whether the last exploring act was in this state.
   bool explored_in(std::span<const double> state, std::size_t environment) const {
     const Episode& episode = episodes_.of(environment);
     return !episode.picked.empty() && std::ranges::equal(state, episode.state);
@@ -97,7 +97,7 @@ class FuzzyDimension {
       return policy_.best_action(rules_.values(fired.rules[i]), ties);
     });
   }
-  /// The stream that decides in acts without `explore`.
+  /// The random stream that breaks ties in acts without `explore`.
   core::Random& evaluation_ties() noexcept { return policy_.ties(false); }
 
   /// Returns sum max_a v_i[a] alpha_i / sum alpha_i over rules that fired.
@@ -121,7 +121,7 @@ class FuzzyDimension {
       return rules_.value(episode.fired.rules[i], episode.picked[i]);
     });
     const double step = config_.learning_coefficient * (target - value_of_picks);
-    const bool is_large = !(std::abs(step) < kLargeStep);  // others need no room to go back
+    const bool is_large = !(std::abs(step) < kLargeStep);  // only then traces may be restored
     const std::vector<Trace> before = is_large ? episode.traces : std::vector<Trace>();
     renew_traces(episode);
     for (const Trace& trace : episode.traces) {
@@ -153,7 +153,8 @@ class FuzzyDimension {
     double eligibility;
   };
 
-  /// Asked before memory is: the number of rules that fire doubles with every input.
+  /// Returns the rules. Throws std::length_error before memory is allocated if the rules that fire
+  /// and their traces need too much: the number of rules that fire doubles with every input.
   approximators::FuzzyRules with_room(approximators::FuzzyRules rules) const {
     const double per_rule = 2.0 * (sizeof(std::size_t) + sizeof(double)) + sizeof(std::size_t) +
                             static_cast<double>(trace_lifetime() + 1) * sizeof(Trace);
@@ -179,7 +180,7 @@ class FuzzyDimension {
     episode.trace_dt = 1.0;
   }
 
-  /// With room for whatever may come: a copy has none.
+  /// Makes an episode and reserves all memory that it may need. Copies do not keep such reserves.
   Episode new_episode() const {
     Episode episode;
     episode.state.resize(rules_.n_inputs());
@@ -209,7 +210,7 @@ class FuzzyDimension {
     if constexpr (Archive::kReads) self.take(archive, listed, picked, traced, eligibilities);
   }
 
-  /// Takes over what was read, after checks.
+  /// Checks the members that were read, and takes them over.
   template <class Archive>
   void take(const Archive& archive, Episode& read, const std::vector<std::int64_t>& picked,
             const std::vector<std::int64_t>& traced, const std::vector<double>& eligibilities) {
@@ -254,7 +255,7 @@ class FuzzyDimension {
     return config;
   }
 
-  static constexpr double kSlowestFading = 0.99;  // bounds the room for traces
+  static constexpr double kSlowestFading = 0.99;  // limits the memory for traces
   static constexpr double kLargest = std::numeric_limits<float>::max();
   static constexpr double kLargeStep = 1e28;  // smaller ones move no value that is near kLargest
 

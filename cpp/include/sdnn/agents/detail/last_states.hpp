@@ -39,7 +39,7 @@ struct LastState {
 /// which start as a copy of the learned episode's and are dropped when that continues.
 class LastStates {
  public:
-  /// Room for a state that is being found.
+  /// Memory in which a state is computed.
   struct Room {
     LastState next = {};
     std::vector<double> inputs = {};
@@ -87,7 +87,7 @@ class LastStates {
   }
   /// Computes the state of an observation in a greedy episode, and keeps nothing. The observation
   /// is the last one, whose state is returned unchanged, or that of the next step. Many threads may
-  /// call it at once, with a room each.
+  /// call it at once, with a separate `room`.
   void peek(const Observations& observations, std::size_t environment,
             std::span<const double> observation, std::span<double> state, Room& room) const {
     if (history_.is_none()) return observations.scale(observation, state);
@@ -153,7 +153,7 @@ class LastStates {
     if (last_.size() > environment) last_.resize(environment);
   }
 
-  /// Lists what is remembered; see core/state.hpp.
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     std::uint64_t n = self.last_.size();

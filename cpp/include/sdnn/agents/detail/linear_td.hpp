@@ -49,7 +49,7 @@ class LinearTD {
 
   Readout& readout() noexcept { return readout_; }
   const Readout& readout() const noexcept { return readout_; }
-  /// The factor by which the trace of an episode is to decay next, kDecayOne for 1.
+  /// The factor by which the trace of an episode is to decay next, in units of 1 / kDecayOne.
   std::int32_t decay(const Episode& episode) const noexcept {
     return episode.trace_dt == 1.0 ? usual_decay_ : decay_of(episode.trace_dt);
   }
@@ -88,8 +88,8 @@ class LinearTD {
     return {target - value, drift};
   }
 
-  /// Learns the error at a rate, kRateOne for 1, after which the present transition is the one
-  /// before.
+  /// Learns the error at a rate, in units of 1 / kRateOne, after which the present transition is
+  /// the one before.
   void correct(Episode& episode, Episodes<Episode>& episodes, Action action, Error error,
                std::int32_t rate, bool is_dutch) {
     const int n_doubled = readout_.learn(episode.present.code(), action, episode.trace,
@@ -145,7 +145,7 @@ class LinearTD {
   static int floor_log2(std::int64_t x) noexcept {
     return static_cast<int>(std::bit_width(static_cast<std::uint64_t>(x))) - 1;
   }
-  /// After the unit was doubled so often.
+  /// Halves the stored values once for each doubling of the unit.
   void halve_old_values(int n_doubled, Episodes<Episode>& episodes) {
     for (; n_doubled > 0; --n_doubled) {
       for (std::size_t i = 0; i < episodes.size(); ++i) {

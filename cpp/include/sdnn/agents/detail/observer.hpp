@@ -62,7 +62,7 @@ class Observer {
 
   std::size_t n_inputs() const noexcept { return circular_.size(); }
   double gain() const noexcept { return gain_; }
-  /// By how much the mean logarithm of squared errors of prediction falls by estimates.
+  /// The decrease of the mean logarithm of squared prediction errors if estimates replace inputs.
   double improvement() const noexcept {
     return (log_error_without_ - log_error_) / static_cast<double>(n_inputs());
   }
@@ -133,7 +133,8 @@ class Observer {
     return std::ranges::max(shares);
   }
 
-  /// Lists what was fitted; see core/state.hpp. Inputs that are angles are those of the task.
+  /// Lists the members that are saved and restored; see core/state.hpp. Inputs that are angles are
+  /// those of the task.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.numbers("means", self.means_);
@@ -150,7 +151,7 @@ class Observer {
     archive.numbers("high", self.high_);
     if constexpr (Archive::kReads) self.check(archive);
   }
-  /// Takes which inputs are angles, and the number of dimensions of actions, before it is read.
+  /// Makes an observer whose fitted members are restored from a state.
   Observer(std::vector<bool> circular, std::size_t n_dimensions)
       : circular_(std::move(circular)), n_levels_(n_dimensions) {}
 
@@ -184,7 +185,7 @@ class Observer {
   static constexpr double kLeastWidth = 1e-3;
   static constexpr double kLeastDeviation = 1e-9;
 
-  /// The nearest number between two; the first of them for NaN, which files can lead to.
+  /// Clips x to [low, high]. NaN, which damaged files can lead to, becomes low.
   static double within(double x, double low, double high) noexcept {
     return x > low ? std::min(x, high) : low;
   }
@@ -230,7 +231,7 @@ class Observer {
     }
   }
 
-  /// Few different actions are told apart; more are numbers.
+  /// Finds how actions are features: by an indicator for each, or by their number if many differ.
   void find_actions(const RandomExperience& experience) {
     for (const std::vector<double>& actions : experience.actions) {
       std::vector<double> levels = actions;

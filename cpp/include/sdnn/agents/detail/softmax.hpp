@@ -15,14 +15,14 @@ namespace sdnn::agents::detail {
 
 /// An action's part of a softmax.
 struct SoftmaxTerm {
-  std::uint32_t weight = 0;        ///< exp(h - max h), 2^30 for 1; 0 where it is not allowed
-  std::int32_t probability = 0;    ///< 2^16 for 1
-  std::int32_t entropy_slope = 0;  ///< p (log p + H), minus the entropy's derivative; 2^16 for 1
+  std::uint32_t weight = 0;        ///< exp(h - max h), in units of 2^-30; 0 where it is not allowed
+  std::int32_t probability = 0;    ///< in units of 2^-16
+  std::int32_t entropy_slope = 0;  ///< p (log p + H): minus the entropy's slope, times 2^16
 };
 
 inline constexpr int kExponentBits = 20;  ///< of logarithms to the base 2
 
-/// Returns 2^-x, 2^30 for 1, to 5e-6; x in [0, 64) has 20 fractional bits.
+/// Returns 2^-x, in units of 2^-30, to 5e-6; x in [0, 64) has 20 fractional bits.
 constexpr std::int64_t power_of_half(std::int64_t x) noexcept {
   // Coefficients of a polynomial of degree 4 for 2^-f, f in [0, 1), that is exact at both ends.
   constexpr std::int64_t kCoefficients[] = {7356191, -57204762, 257158220, -744180561, 1 << 30};
@@ -52,8 +52,8 @@ constexpr std::int64_t log2_of(std::uint64_t x) noexcept {
 /// All spans have equal sizes, but `allowed` may be empty. Requires that an action is allowed.
 inline void softmax(std::span<const std::int64_t> preferences, ActionMask allowed, int n_unit_bits,
                     std::span<SoftmaxTerm> terms) noexcept {
-  constexpr std::int64_t kLog2E = 1549082005;  // log2(e), 2^30 for 1
-  constexpr std::int64_t kLn2 = 45426;         // ln(2), 2^16 for 1
+  constexpr std::int64_t kLog2E = 1549082005;  // log2(e), in units of 2^-30
+  constexpr std::int64_t kLn2 = 45426;         // ln(2), in units of 2^-16
   constexpr std::int64_t kMostBits = std::int64_t{40} << kExponentBits;
   std::int64_t best = INT64_MIN;
   for (std::size_t a = 0; a < terms.size(); ++a) {
@@ -71,7 +71,7 @@ inline void softmax(std::span<const std::int64_t> preferences, ActionMask allowe
     sum += terms[a].weight;
   }
   const std::int64_t log2_sum = log2_of(sum);
-  std::int64_t entropy = 0;  // in bits, 2^36 for 1
+  std::int64_t entropy = 0;  // in bits, in units of 2^-36
   for (std::size_t a = 0; a < terms.size(); ++a) {
     SoftmaxTerm& term = terms[a];
     term.probability =

@@ -40,7 +40,8 @@ class TakenActions {
     if (taken_.size() > environment) taken_.resize(environment);
   }
 
-  /// Lists what is remembered; see core/state.hpp. After reading, `fits` must be called.
+  /// Lists the members that are saved and restored; see core/state.hpp. After reading, `fits` must
+  /// be called.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     std::vector<std::int64_t> environments, indices;
@@ -71,7 +72,8 @@ class TakenActions {
     }
   }
 
-  /// Whether all are actions in so many environments. What was read has its actions then.
+  /// Returns whether restored indices are those of actions in at most n_environments environments,
+  /// and computes their actions.
   bool fits(std::size_t n_environments, const Actions& actions) {
     if (taken_.size() > n_environments) return false;
     for (Taken& taken : taken_) {

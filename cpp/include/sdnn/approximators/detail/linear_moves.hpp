@@ -18,7 +18,7 @@ inline void LinearSDNN::shrink_weights(std::int32_t used) noexcept {
   while (used >= kLargestWeight) {
     double_unit();
     used >>= 1;
-    // Halves are rounded up, so the largest weight may still be too large.
+    // Rounding up may leave a weight of kLargestWeight, although its halved bits were below it.
     if (std::ranges::find(weights_, kLargestWeight) != weights_.end()) used |= kLargestWeight;
   }
 }
@@ -26,7 +26,7 @@ inline void LinearSDNN::shrink_weights(std::int32_t used) noexcept {
 inline int LinearSDNN::move_rows(const Code& code, std::span<const std::int64_t> errors,
                                  std::int32_t rate) {
   assert(errors.size() == n_rows());
-  const std::int64_t part = (std::int64_t{rate} << 12) / n_weights_of(code);  // 2^28 for 1
+  const std::int64_t part = (std::int64_t{rate} << 12) / n_weights_of(code);  // in units of 2^-28
   const std::int32_t exponent = exponent_.value_or(0);
   std::vector<std::int64_t> steps(errors.begin(), errors.end());
   std::int64_t largest = 0;

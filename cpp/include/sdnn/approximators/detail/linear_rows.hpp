@@ -22,8 +22,8 @@ struct CodeMasks {
 
 /// The change of a row and its trace, in fixed-point numbers whose products fit into 32 bits.
 struct RowStep {
-  std::int32_t decay;       ///< factor of the trace in [0, 2^13], 2^13 for 1
-  std::int32_t gain;        ///< the code's part of the new trace, 2^12 for 1; 0 outside the action
+  std::int32_t decay;  ///< factor of the trace in [0, 2^13], in units of 2^-13
+  std::int32_t gain;  ///< the code's part of the new trace, in units of 2^-12; 0 outside the action
   std::int32_t replace;     ///< a mask: the code replaces the trace where it is not 0
   std::int32_t step;        ///< weights change by step * trace / 2^shift; below 2^13
   std::int32_t shift;       ///< in [1, 30]

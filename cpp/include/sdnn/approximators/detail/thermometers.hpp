@@ -21,9 +21,10 @@ namespace sdnn::approximators {
 /// once, like a linear function of the inputs, with the integer arithmetic of other codes.
 class Thermometers {
  public:
-  /// No columns.
+  /// Makes codes without columns.
   Thermometers() = default;
-  /// Codes of `n_units` units for inputs with n_bins[i] bins; inputs with 0 have none.
+  /// Makes codes of `n_units` units for inputs with n_bins[i] bins; inputs with 0 bins have no
+  /// code.
   Thermometers(std::size_t n_units, std::vector<coding::Bin> n_bins)
       : n_units_(static_cast<coding::Bin>(n_units)), n_bins_(std::move(n_bins)) {}
 

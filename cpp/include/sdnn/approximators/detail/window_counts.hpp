@@ -86,6 +86,7 @@ class WindowCounts {
   /// mask is empty. Shape: (n_actions,).
   void exclude(std::span<const std::uint8_t> mask) noexcept {
     if (mask.empty()) return;
+    // Without separate counts of actions, every window is that of an action.
     std::vector<std::int32_t>& counts = of_actions_.empty() ? of_windows_ : of_actions_;
     for (std::size_t action = 0; action < mask.size(); ++action) {
       if (mask[action] == 0) counts[action] = -1;

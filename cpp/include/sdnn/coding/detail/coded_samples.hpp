@@ -31,7 +31,7 @@ class CodedSamples {
   }
 
   std::size_t size() const noexcept { return size_; }
-  /// Words of a code, a multiple of 4.
+  /// The number of words of a code, a multiple of 4.
   std::size_t n_words() const noexcept { return n_words_; }
   TernaryCode operator[](std::size_t t) const noexcept {
     const std::uint64_t* const active = words_.data() + 2 * t * n_words_;

@@ -33,7 +33,7 @@ struct TernaryCode {
 
 namespace detail {
 
-/// The part of the words [begin, end).
+/// The contribution of the words [begin, end) to the inner product.
 SDNN_INLINE std::int32_t inner_product_of_words(const TernaryCode& one, const TernaryCode& other,
                                                 std::size_t begin, std::size_t end) noexcept {
   std::int32_t both = 0;

@@ -38,7 +38,7 @@ inline constexpr auto kCrcTables = [] {
   return tables;
 }();
 
-/// The remainder after more bytes, sixteen at a time.
+/// The remainder `crc` after more bytes, sixteen of them at a time.
 inline std::uint32_t crc_by_tables(std::span<const std::byte> bytes, std::uint32_t crc) noexcept {
   static_assert(std::endian::native == std::endian::little, "words are taken as they lie there");
   for (; bytes.size() >= 16; bytes = bytes.subspan(16)) {

@@ -49,7 +49,7 @@ SDNN_INLINE void move_in_lanes(const AcrobotDynamics& dynamics, const AcrobotArr
   }
 }
 #else
-/// Without such registers one acrobot moves after the other.
+/// Moves one acrobot after the other, in builds without vector registers.
 template <std::size_t Size>
 void move_in_lanes(const AcrobotDynamics& dynamics, const AcrobotArrays& arrays,
                    std::size_t n) noexcept {

@@ -14,7 +14,7 @@
 
 namespace sdnn::estimators {
 
-/// The changes by a part of a training.
+/// The numbers of corrections in a part of a training.
 struct TrainingCount {
   std::size_t n_samples = 0;  ///< presentations that corrected something
   std::size_t n_units = 0;    ///< corrections of single units
