@@ -227,7 +227,7 @@ def test_knots_of_quantiles_rise_from_rank_0_to_1():
 def test_missing_and_unknown_values_have_the_last_bin():
     numbers = np.array([4.0, None, 0.0, np.nan, pd.NA], dtype=object)
     coding = WithMissing(base=Anchor(n_anchor_patterns=3, n_interpolated=1)).fit(numbers, 8)
-    assert (coding.base.low, coding.base.high, coding.size) == (0.0, 4.0, 5)
+    assert (coding.base.low, coding.base.high, coding.size) == (0.0, 4.0, 4 + 1)
     assert coding.ends() == (0.0, 4.0)
     assert coding.bins(numbers).tolist() == [3, 4, 0, 4, 4]
     assert coding.bins(np.array([2.0, np.nan])).tolist() == [2, 4]

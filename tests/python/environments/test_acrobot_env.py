@@ -80,12 +80,12 @@ def test_the_spaces_are_unit_boxes_of_the_chosen_dtype():
     assert env.action_space == gym.spaces.Box(-1.0, 1.0, (1,), np.float64)
 
 
-def test_the_environment_has_the_bits_of_the_core():
+def test_steps_and_resets_of_the_environment_have_the_bits_of_the_core():
     env = AcrobotSwingUpEnv(dtype="float64")
     core = _core.Acrobot(AcrobotConfig())
     sensors = _core.AcrobotSensors(_core.SensorConfig(), 1, _core.Stream.sensor_noise)
-    n_finished = 0
-    for episode in range(1, 41):
+    n_episodes, n_finished = 40, 0
+    for episode in range(1, n_episodes + 1):
         tolerance = 1.0 / episode
         observation, info = env.reset(options={"goal_tolerance": tolerance})
         core.reset()
@@ -93,7 +93,7 @@ def test_the_environment_has_the_bits_of_the_core():
         assert info["goal_tolerance"] == tolerance
         for share in shares(50, episode):
             observation, *result, info = env.step(np.array([share]))
-            assert tuple(result) == core.step(10.0 * share, tolerance)
+            assert tuple(result) == core.step(AcrobotConfig().max_torque * share, tolerance)
             np.testing.assert_array_equal(info["state"], core.state())
             np.testing.assert_array_equal(observation, sensors.observe(core.state()))
             assert info["tip_height"] == core.tip_height()
@@ -101,7 +101,7 @@ def test_the_environment_has_the_bits_of_the_core():
             if result[1] or result[2]:
                 n_finished += 1
                 break
-    assert n_finished == 40
+    assert n_finished == n_episodes
 
 
 def test_an_episode_is_truncated_after_50_decisions_and_needs_a_reset():
@@ -190,7 +190,8 @@ def test_human_mode_draws_25_frames_per_second_and_render_returns_none(monkeypat
     env = AcrobotSwingUpEnv(render_mode="human")
     env.reset()
     env.step([1.0])
-    assert FakeClock.ticks == 26 * [25]  # the reset's frame, and 25 of the decision
+    frames_per_second = 25
+    assert FakeClock.ticks == (1 + 25) * [frames_per_second]  # the reset's, and 25 of the decision
     assert env.render() is None
     env.close()
 

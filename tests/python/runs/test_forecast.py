@@ -43,12 +43,12 @@ def test_forecasts_use_stored_trials_or_else_one_probe(use_trial, study, tmp_pat
     by_variant = {trial["variant"]: trial for trial in forecast["trials"]}
     stored = by_variant["discount=0.8"]
     assert (stored["seconds_of_a_trial"], stored["source"]) == (3.0, "1 stored trial")
-    # 10 episodes in 0.1 s: 0.3 s are reached after 30 or 40.
+    probed = 1005 * 0.1 / 10  # 10 episodes in 0.1 s: 0.3 s are reached after 30 or 40
     for name in ("base", "discount=0.9"):
-        assert by_variant[name]["seconds_of_a_trial"] == pytest.approx(10.05)
+        assert by_variant[name]["seconds_of_a_trial"] == pytest.approx(probed)
         assert by_variant[name]["source"].startswith("the first ")
     assert len(made) == 2 + 1  # tried, but for one that is the same, and one probe
-    assert forecast["seconds"] == pytest.approx(3.0 + 2 * 10.05)
+    assert forecast["seconds"] == pytest.approx(3.0 + 2 * probed)
 
 
 def test_budgets_in_steps_and_in_episodes_have_separate_probes(study, tmp_path, monkeypatch):

@@ -1,6 +1,7 @@
 """Levels beside learning curves: goals, random actions and stored baselines."""
 
 import gymnasium as gym
+import numpy as np
 import pytest
 
 from refusals import refuses
@@ -18,14 +19,20 @@ def test_goals_are_those_of_registrations_unless_arguments_change_the_environmen
     assert goal_of(EnvironmentSpec(id="a_module:Unknown-v0")) is None
 
 
-def test_random_actions_in_an_environment_of_known_returns():
+def test_the_mean_return_of_random_actions_is_that_of_environments_where_it_is_known():
     # Without reaching the goal, an episode of MountainCar has 200 steps of reward -1.
     assert mean_random_return(EnvironmentSpec(id="MountainCar-v0")) == -200
-    limited = EnvironmentSpec(id="Pendulum-v1", kwargs={"max_episode_steps": 10})
-    assert -170 < mean_random_return(limited) < 0
+    n_steps = 10
+    limited = EnvironmentSpec(id="Pendulum-v1", kwargs={"max_episode_steps": n_steps})
+    lowest_reward = -(np.pi**2 + 0.1 * 8.0**2 + 0.001 * 2.0**2)  # angle, speed, torque of Pendulum
+    assert n_steps * lowest_reward < mean_random_return(limited) < 0
+    assert 15 < mean_random_return(CARTPOLE) < 30, "a random episode of CartPole has about 22 steps"
+
+
+def test_the_mean_return_of_random_actions_is_the_same_each_time():
+    first = mean_random_return(CARTPOLE)
     mean_random_return.cache_clear()
-    assert mean_random_return(CARTPOLE) == mean_random_return(CARTPOLE.replace(noise=0.0))
-    assert 15 < mean_random_return(CARTPOLE) < 30
+    assert mean_random_return(CARTPOLE) == first
 
 
 @pytest.fixture

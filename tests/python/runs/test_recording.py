@@ -37,13 +37,14 @@ def test_a_gif_shows_every_state_of_an_evaluation_episode(run, tmp_path):
     assert recording.n_frames == evaluation.lengths[0] + 1
     assert recording.total_reward == pytest.approx(evaluation.returns[0], rel=1e-12)
     with Image.open(tmp_path / "x.gif") as picture:
-        assert picture.size == (65, 33)
+        assert picture.size == (65, 33), "as the environment draws it"
         durations = 0
         for number in range(picture.n_frames):
             picture.seek(number)
             durations += picture.info["duration"]
-        # Equal neighbours are one that is shown longer, the last one for a second more.
-        assert durations == 100 * recording.n_frames + 1000
+        # Equal frames in a row are one that is shown longer; the last one is for a second more.
+        frame = 1000 / drifting_env.DriftingEnv.metadata["render_fps"]  # in milliseconds
+        assert durations == frame * recording.n_frames + 1000
         picture.seek(0)
         first = np.asarray(picture.convert("RGB"))
     env = gym.make("tests/Drifting-v0", render_mode="rgb_array")
@@ -60,7 +61,7 @@ def test_an_mp4_has_even_sides_and_every_frame(run, tmp_path):
     program = imageio_ffmpeg.get_ffmpeg_exe()
     command = [program, "-i", tmp_path / "x.mp4", "-f", "null", "-"]
     process = subprocess.run(command, capture_output=True, text=True)
-    assert "66x34" in process.stderr
+    assert "66x34" in process.stderr, "one more than the 65 x 33 of the environment"
     assert "10 fps" in process.stderr
     assert re.findall(r"frame= *(\d+)", process.stderr)[-1] == str(recording.n_frames)
     assert [path.name for path in tmp_path.iterdir()] == ["x.mp4"]
@@ -80,10 +81,10 @@ def test_recordings_show_frames_between_decisions(tmp_path):
     run = Run.create(tmp_path / "run", config)
     run.train()
     recording = record(run, tmp_path / "x.gif", max_steps=2)
-    assert recording.n_frames == 51  # the reset's, and 25 of each decision
+    assert recording.n_frames == 1 + 2 * 25  # the reset's, and 25 of each decision
     with Image.open(tmp_path / "x.gif") as picture:
-        assert picture.n_frames == 51
-        assert picture.info["duration"] == 40
+        assert picture.n_frames == recording.n_frames
+        assert picture.info["duration"] == 1000 / 25  # milliseconds: a decision takes a second
 
 
 def test_a_missing_imageio_ffmpeg_is_named(run, tmp_path, monkeypatch):

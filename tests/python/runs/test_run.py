@@ -283,9 +283,7 @@ def test_a_run_loads_its_agent_and_evaluates_it_reproducibly(whole):
     evaluation = run.evaluate(3)
     assert np.array_equal(run.evaluate(3).returns, evaluation.returns)
     assert not np.array_equal(run.evaluate(3, seed=1).returns, evaluation.returns)
-    last = [row for row in run.rows() if row["kind"] == "evaluation"][-1]
-    assert last["step"] == 360
-    assert len(run.evaluate(2, seed=3).returns) == 2  # the seed of the run
+    assert len(run.evaluate(2, seed=CONFIG.seed).returns) == 2
 
 
 def test_missing_and_damaged_files_of_a_run_are_refused_by_name(whole, tmp_path):

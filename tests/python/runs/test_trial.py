@@ -125,11 +125,12 @@ def entry_of(agent_id):
 
 
 def test_computing_action_values_does_not_change_the_rows_of_a_trial():
+    n_torques = 601  # of the paper
     asked, alone = (spec_of("sdnn-c", noise=0.02).make_trial(SEED) for _ in range(2))
     for _ in range(60):
         asked.advance(1)
         values = asked.agent.networks[0].values([0.5, 0.5, 0.5, 0.5])
-        assert values.shape == (601,)
+        assert values.shape == (n_torques,)
     alone.advance(60)
     for name, column in alone.test_rows().items():
         np.testing.assert_array_equal(asked.test_rows()[name], column)
@@ -142,7 +143,7 @@ def test_duplicate_and_invalid_ids_are_not_registered():
     assert before == AGENTS
 
 
-def test_agents_have_labels_titles_and_entries():
+def test_agents_and_their_presets_have_labels_and_titles():
     expected_labels = ["sdnn-c", "fuzzy", "rbf", "q-lambda", "actor-critic"]
     expected_labels += ["sdnn-c-general", "sdnn-c-robust"]
     expected_labels += ["sdnn-c-small", "q-lambda-general", "actor-critic-general"]
@@ -151,12 +152,15 @@ def test_agents_have_labels_titles_and_entries():
         "SDNN-C", "FQL", "RBFN", "SDNNQLambda", "SDNNActorCritic", "SDNN-C, general",
         "SDNN-C, robust", "SDNN-C, small", "SDNNQLambda, general", "SDNNActorCritic, general",
     ]  # fmt: skip
+
+
+def test_the_entry_of_a_preset_is_its_agents_and_unknown_agents_are_refused():
     assert all(agent_entry(name) is entry for name, entry in AGENTS.items())
     assert agent_entry("sdnn-c-small") is AGENTS["sdnn-c"]
     refuses("dqn", agent_entry, "dqn")
 
 
-def test_a_registered_dataclass_is_the_default_configuration_of_its_agent(monkeypatch):
+def test_a_registered_dataclass_configures_its_agent_by_default_and_is_hashed(monkeypatch):
     monkeypatch.setitem(AGENTS, "new", entry_of("new"))
     spec = spec_of("new", 5)
     assert spec.approximator == Nothing()

@@ -89,7 +89,7 @@ def test_equal_trials_are_counted_and_the_folder_stays_as_it_is(fake_store):
     assert len(verify_folder(fake_store, n_trials=None).equal) == 6
 
 
-def test_trials_are_drawn_evenly_and_again_by_a_seed(fake_store):
+def test_trials_are_drawn_evenly_over_cases_and_the_same_by_a_seed(fake_store):
     keys = StoredReports(fake_store, Consent()).keys
     drawn = choose_trials(keys, 2, seed=1)
     assert {key.case_id for key in drawn} == {"s4", "s6"}
@@ -104,6 +104,7 @@ def test_trials_are_drawn_evenly_and_again_by_a_seed(fake_store):
 def test_a_changed_byte_of_a_row_is_found_in_any_trial(fake_store, n_trials):
     path = fake_store / "results.sqlite"
     with sqlite3.connect(path) as connection:
+        # Of the 30 rows of a trial, the first has number 0.
         connection.execute("UPDATE rows SET length = 49 WHERE run_id = 3 AND number = 4")
     connection.close()
     for seed in range(4):  # whether or not the trial is drawn
@@ -134,7 +135,7 @@ def test_missing_rows_and_wrong_counts_of_decisions_are_found(tmp_path, real_rec
     record = real_records[0]
     shorter = replace(record, rows=TrialRows(record.rows.table[:-1]))
     problem = only_difference(verify_folder(stored(tmp_path / "shorter", [shorter]))).problem
-    assert "3 rows" in problem
+    assert f"{len(record.rows.table)} rows" in problem, "of the trial that is run here"
     more = replace(record, n_decisions=record.n_decisions + 1)
     problem = only_difference(verify_folder(stored(tmp_path / "more", [more]))).problem
     assert f"{more.n_decisions}" in problem
