@@ -129,12 +129,11 @@ def live(agent, first):
         state = next_state
 
 
-def test_a_program_compiles_in_three_seconds_and_300_mb(build, needs):
+def test_a_program_compiles_in_300_mb(build, needs):
     needs("ninja")
     command = [sys.executable, ROOT / "bench" / "header_cost.py", build, "robot"]
     printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    seconds, megabytes = map(float, re.findall(r"([\d.]+) (?:s|MB)", printed))
-    assert seconds < 3
+    (megabytes,) = map(float, re.findall(r"([\d.]+) MB", printed))
     assert 50 < megabytes < 300
 
 
