@@ -14,17 +14,8 @@ from c_learners import (
     sarsa,
     several,
 )
-from c_policies import TARGETS, run
+from c_policies import SANITIZED, run
 from sdnn.training.files import EpisodeBlock
-
-SANITIZED = ("-fsanitize=undefined,address", "-fno-sanitize-recover=all")
-
-
-@pytest.fixture
-def target(needs):
-    needs(TARGETS["x86-64"].compiler, options=SANITIZED)
-    return TARGETS["x86-64"]
-
 
 SCORES = """
 #include <stdio.h>

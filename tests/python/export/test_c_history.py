@@ -20,18 +20,10 @@ from c_histories import (
     warmed_up,
 )
 from c_learners import build, run_agent, run_program
-from c_policies import STRICT, STRICT_CPP, TARGETS, box, program, run
+from c_policies import SANITIZED, STRICT, STRICT_CPP, box, program, run
 from refusals import refuses
 from sdnn.agents import SDNNQLambda, SDNNQLearning
 from sdnn.export import c_header, load_image, save_image
-
-SANITIZED = ("-fsanitize=undefined,address", "-fno-sanitize-recover=all")
-
-
-@pytest.fixture
-def target(needs):
-    needs(TARGETS["x86-64"].compiler, options=SANITIZED)
-    return TARGETS["x86-64"]
 
 
 @pytest.mark.parametrize("kind", ["int32_t", "double", "float"])

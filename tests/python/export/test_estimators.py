@@ -23,7 +23,7 @@ from c_estimators import (
     fitted,
     numbers,
 )
-from c_policies import STRICT, STRICT_CPP, TARGETS, program, run
+from c_policies import SANITIZED, STRICT, STRICT_CPP, program, run
 from refusals import refuses
 from sdnn import SDNNClassifier, SDNNRegressor
 from sdnn.coding import Circular, RandomInverse, Symbolic
@@ -32,7 +32,6 @@ from sdnn.export import estimator_header, export_estimator_header, small_setting
 from sdnn.export.estimators import CODE_BYTES
 
 PAGE = Path(__file__).parents[3] / "docs" / "how-to" / "estimators-on-a-chip.md"
-SANITIZED = ("-fsanitize=undefined", "-fno-sanitize-recover=all", "-fsanitize=address")
 BINS = """
 #include <stdio.h>
 #include "model.h"
@@ -45,12 +44,6 @@ int main(void) {
   return 0;
 }
 """
-
-
-@pytest.fixture
-def target(needs):
-    needs(TARGETS["x86-64"].compiler, options=SANITIZED)
-    return TARGETS["x86-64"]
 
 
 @pytest.mark.parametrize("name", ESTIMATORS)

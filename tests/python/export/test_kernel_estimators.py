@@ -7,18 +7,15 @@ import pytest
 from sklearn.exceptions import NotFittedError
 
 from c_kernel_estimators import KERNEL_ESTIMATORS, check_kernel, fitted_kernel
-from c_policies import TARGETS
+from c_policies import SANITIZED
 from refusals import refuses
 from sdnn import SDNNKernelRidge
 from sdnn.export import estimator_header
 
-SANITIZED = ("-fsanitize=undefined", "-fno-sanitize-recover=all", "-fsanitize=address")
-
 
 @pytest.mark.parametrize("name", KERNEL_ESTIMATORS)
-def test_outputs_in_c_are_sums_in_the_order_of_the_samples(name, needs, tmp_path):
-    needs(TARGETS["x86-64"].compiler, options=SANITIZED)
-    check_kernel(name, TARGETS["x86-64"], tmp_path, 100, *SANITIZED)
+def test_outputs_in_c_are_sums_in_the_order_of_the_samples(name, target, tmp_path):
+    check_kernel(name, target, tmp_path, 100, *SANITIZED)
 
 
 def test_kernel_estimators_do_not_learn_in_c():

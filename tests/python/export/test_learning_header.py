@@ -29,7 +29,7 @@ from c_learners import (
     several,
     small_steps,
 )
-from c_policies import STRICT, STRICT_CPP, TARGETS, box, program, run
+from c_policies import STRICT, STRICT_CPP, box, program, run
 from refusals import refuses
 from sdnn.agents import (
     QLambdaConfig,
@@ -42,12 +42,6 @@ from sdnn.agents import (
 from sdnn.export import c_header, load_image, save_image
 
 SANITIZED = ("-fsanitize=undefined", "-fno-sanitize-recover=all")
-
-
-@pytest.fixture
-def target(needs):
-    needs(TARGETS["x86-64"].compiler, options=[*SANITIZED, "-fsanitize=address"])
-    return TARGETS["x86-64"]
 
 
 @pytest.mark.parametrize("name", LEARNERS)

@@ -18,10 +18,8 @@ from c_learners import (
     small_steps,
     states,
 )
-from c_policies import TARGETS, run
+from c_policies import SANITIZED, run
 from sdnn.export import load_image, save_image
-
-SANITIZED = ("-fsanitize=undefined,address", "-fno-sanitize-recover=all")
 
 PARTS = """
 #include <stdio.h>
@@ -84,12 +82,6 @@ int main(void) {
   return memcmp(saved, images[0], sizeof saved) != 0;
 }
 """
-
-
-@pytest.fixture
-def target(needs):
-    needs(TARGETS["x86-64"].compiler, options=SANITIZED)
-    return TARGETS["x86-64"]
 
 
 def trained(make, seed=1, n_steps=300):

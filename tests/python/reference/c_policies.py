@@ -15,6 +15,7 @@ from sdnn.export import c_header, export_c_header
 Box, Discrete = gym.spaces.Box, gym.spaces.Discrete
 STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror")
 STRICT_CPP = ("-std=c++11", "-Wall", "-Wextra", "-Wconversion", "-Werror")
+SANITIZED = ("-fsanitize=undefined,address", "-fno-sanitize-recover=all")
 ALONE = ("-ffreestanding", "-nostdlib")
 N_STATES = 10_000
 SMALL = SDNNCConfig(n_pattern_units=24, n_hidden_units=60, n_active_units=20, n_actions=5)
