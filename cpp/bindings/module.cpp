@@ -43,6 +43,7 @@ void translate(std::exception_ptr error) {
 
 }  // namespace
 
+// Without mod_gil_not_used: objects.hpp relies on the GIL.
 PYBIND11_MODULE(_core, module) {
   module.doc() = "The compiled core of sdnn; use it through the packages above it.";
   module.attr("__version__") = SDNN_VERSION;
