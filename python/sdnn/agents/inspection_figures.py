@@ -23,7 +23,18 @@ from sdnn.agents.inspection import (
 from sdnn.agents.state_maps import Replay, StateMap, map_of
 from sdnn.environments.space_kinds import require_same_kind
 from sdnn.environments.types import Elements, Env
-from sdnn.reports.plots import COLORS, FAINT, INK, Axes, Figure, color_of, new_figure, style
+from sdnn.reports.plots import (
+    COLORS,
+    FAINT,
+    INK,
+    NARROW_WIDTH,
+    WIDTH,
+    Axes,
+    Figure,
+    color_of,
+    new_figure,
+    style,
+)
 from sdnn.support.arguments import require, seed_of
 
 if TYPE_CHECKING:
@@ -44,12 +55,19 @@ def is_discrete(agent: AnyAgent) -> bool:
     return not isinstance(agent.action_space, gym.spaces.Box)
 
 
-def draw_map(agent: AnyAgent, value_name: str, state_map: StateMap, states: Floats) -> Figure:
-    """Draw values and greedy actions over one or two inputs, and the states that were met."""
+def draw_map(
+    agent: AnyAgent, value_name: str, state_map: StateMap, states: Floats, *, narrow: bool = False
+) -> Figure:
+    """Draw values and greedy actions over one or two inputs, and the states that were met.
+
+    With `narrow` panels are below each other, for telephones; in the other figures, too.
+    """
     n_dimensions = min(state_map.actions.shape[-1], MOST_DIMENSIONS)
-    width = 4.6 * (1 + n_dimensions)
-    figure = new_figure(min(width, 14.0), 3.7)
-    panels = figure.subplots(1, 1 + n_dimensions, squeeze=False)[0]
+    n_panels = 1 + n_dimensions
+    size = (NARROW_WIDTH, 3.7 * n_panels) if narrow else (min(4.6 * n_panels, 14.0), 3.7)
+    figure = new_figure(*size)
+    shape = (n_panels, 1) if narrow else (1, n_panels)
+    panels = figure.subplots(*shape, squeeze=False).ravel()
     draw_values(panels[0], value_name, state_map, states)
     for d in range(n_dimensions):
         draw_policy(panels[1 + d], agent, state_map, states, d)
@@ -188,11 +206,12 @@ def _whole_ticks(axes: Axes, actions: Floats) -> None:
         axes.set_yticks(numbers)
 
 
-def draw_influences(measured: Sequence[Influence]) -> Figure:
+def draw_influences(measured: Sequence[Influence], *, narrow: bool = False) -> Figure:
     """Draw the influence of each input on values and on actions as bars."""
     shown = list(measured)[:MOST_BARS]
-    figure = new_figure(9.2, 1.0 + 0.27 * len(shown))
-    panels = figure.subplots(1, 2, sharey=True)
+    height = 1.0 + 0.27 * len(shown)
+    figure = new_figure(*((NARROW_WIDTH, 2.0 * height) if narrow else (WIDTH, height)))
+    panels = figure.subplots(*((2, 1) if narrow else (1, 2)), sharey=not narrow)
     heights = np.arange(len(shown))
     for panel, name, title, color in (
         (panels[0], "on_values", "change of values", color_of(0)),
@@ -203,19 +222,25 @@ def draw_influences(measured: Sequence[Influence]) -> Figure:
         panel.set_xlabel("%", fontsize=9, color=INK)
         panel.set_xlim(left=0)
         style(panel, "x")
-    panels[0].set_yticks(heights, [i.input.name for i in shown])
-    panels[0].invert_yaxis()
+    for panel in panels if narrow else panels[:1]:
+        panel.set_yticks(heights, [i.input.name for i in shown])
+        panel.invert_yaxis()
     return plain(figure)
 
 
 def draw_replay(
-    agent: AnyAgent, value_name: str, episode: Replay, inputs: Sequence[AgentInput]
+    agent: AnyAgent,
+    value_name: str,
+    episode: Replay,
+    inputs: Sequence[AgentInput],
+    *,
+    narrow: bool = False,
 ) -> Figure:
     """Draw inputs, values and actions over the steps of a greedy episode."""
     shown = [agent_input for agent_input in inputs if agent_input.is_used][:MOST_STRIPS]
     n_dimensions = min(episode.actions.shape[1], MOST_DIMENSIONS)
     n_strips = len(shown) + 1 + n_dimensions
-    figure = new_figure(9.2, 0.6 + 0.85 * n_strips)
+    figure = new_figure(NARROW_WIDTH if narrow else WIDTH, 0.6 + 0.85 * n_strips)
     panels = figure.subplots(n_strips, 1, sharex=True, squeeze=False)[:, 0]
     steps = np.arange(len(episode.values))
     line = "-" if len(steps) > 1 else "."

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -32,7 +33,19 @@ from sdnn.agents.schedules import schedule_of
 from sdnn.agents.state_maps import Replay, StateMap, map_of, replay
 from sdnn.environments.types import Data, Env
 from sdnn.reports.pages import Page, Section, Table
-from sdnn.reports.plots import FAINT, INK, Figure, color_of, new_figure, style, svg_bytes
+from sdnn.reports.plots import (
+    FAINT,
+    INK,
+    NARROW_DPI,
+    NARROW_WIDTH,
+    WIDTH,
+    Figure,
+    color_of,
+    new_figure,
+    png_bytes,
+    style,
+    svg_bytes,
+)
 from sdnn.runs.errors import ConfigError, RunError
 from sdnn.runs.report import require_matplotlib
 from sdnn.runs.run import Run, agent_of
@@ -103,16 +116,20 @@ class Inspection:
                 f"States have a history ({self.agent.history}): each state counts as the first"
                 " observation of an episode."
             )
-        figure = draw_map(self.agent, self.value_name, self.state_map, self.states)
+        map_parts = (self.agent, self.value_name, self.state_map, self.states)
+        picture, narrow_picture = _pictures(partial(draw_map, *map_parts))
         yield Section(
             title=f"Values and actions over {names}",
-            picture=svg_bytes(figure),
+            picture=picture,
+            narrow_picture=narrow_picture,
             alt=f"Value and greedy action over {names}",
             notes=notes,
         )
+        picture, narrow_picture = _pictures(partial(draw_influences, self.influences))
         yield Section(
             title="Influence of each input",
-            picture=svg_bytes(draw_influences(self.influences)),
+            picture=picture,
+            narrow_picture=narrow_picture,
             alt="Change of values and actions where an input is shuffled",
             is_narrow=True,
             table=self.input_table(),
@@ -125,9 +142,12 @@ class Inspection:
         )
         episode, order = self.episode, [i.input for i in self.influences]
         end = "terminated" if episode.terminated else "not terminated"
+        replay_parts = (self.agent, self.value_name, episode, order)
+        picture, narrow_picture = _pictures(partial(draw_replay, *replay_parts))
         yield Section(
             title="A greedy episode",
-            picture=svg_bytes(draw_replay(self.agent, self.value_name, episode, order)),
+            picture=picture,
+            narrow_picture=narrow_picture,
             alt="Inputs, values and actions over the steps of a greedy episode",
             is_narrow=True,
             notes=[
@@ -135,9 +155,11 @@ class Inspection:
                 " first episode of sdnn evaluate."
             ],
         )
+        picture, narrow_picture = _pictures(self.draw_learning)
         yield Section(
             title="Learning",
-            picture=svg_bytes(self.draw_learning()),
+            picture=picture,
+            narrow_picture=narrow_picture,
             alt="Returns, epsilon and alpha over the steps",
             is_narrow=True,
             table=Table("Numbers", ("quantity", "value"), self.numbers()),
@@ -278,12 +300,13 @@ class Inspection:
             if use is not None and use.outside > OUTSIDE:
                 yield f"{agent_input.name} is outside its range in {use.outside:.0%} of the states."
 
-    def draw_learning(self) -> Figure:
+    def draw_learning(self, *, narrow: bool = False) -> Figure:
         """Draw the returns of episodes and evaluations, and below them epsilon and alpha."""
         episodes = [row for row in self.rows if row["kind"] == "episode"]
         evaluations = [row for row in self.rows if row["kind"] == "evaluation"]
         has_schedule = isinstance(self.agent, ValueAgent) and bool(self.rows)
-        figure = new_figure(9.2, 3.8 if has_schedule else 2.6)
+        width = NARROW_WIDTH if narrow else WIDTH
+        figure = new_figure(width, 3.8 if has_schedule else 2.6)
         panels = figure.subplots(1 + has_schedule, 1, sharex=True, squeeze=False)[:, 0]
         panels[0].plot(
             [row["step"] for row in episodes], [row["return"] for row in episodes], ".",
@@ -339,6 +362,11 @@ class Inspection:
             },
             "warnings": self.warnings(),
         }
+
+
+def _pictures(draw: Callable[..., Figure]) -> tuple[bytes, bytes]:
+    """Return a figure for a page, and the narrow one for telephones."""
+    return svg_bytes(draw()), png_bytes(draw(narrow=True), NARROW_DPI)
 
 
 def inspect_run(
