@@ -110,6 +110,7 @@ ATTRIBUTES = {
     "get_env": "train(env, steps=...)", "set_env": "evaluate(agent, env)", "policy": "approximator",
     "evaluate_policy": "evaluate(agent, env", "device": "CPU", "save_replay_buffer": "by itself",
     "logger": "TensorBoard(folder)", "set_parameters": "load_agent", "choose_action": "act",
+    "verbose": "a bar shows by itself",
     "fit": "train", "set_random_seed": "seed=1", "n_envs": "n_environments",
 }  # fmt: skip
 """Attributes that agents do not have, and what the error must have."""
