@@ -172,6 +172,7 @@ class RandomInverse(Ranged):
         )
 
     def _bins_and_flips(self, n_units: int) -> tuple[int, int]:
+        """Return the numbers of bins and of units flipped per bin, given or by the length scale."""
         most = n_units // 2
         n_bins = None if self.n_bins is None else whole("n_bins", self.n_bins, 2, MAX_BINS)
         if self.n_flipped is not None:

@@ -362,6 +362,7 @@ def _is_unit(space: Space | None) -> bool:
 
 
 def _can_observe(space: Space, other_space: Space) -> bool:
+    """Return whether an agent of a space can read the observations of another space."""
     if isinstance(space, gym.spaces.Dict) and isinstance(other_space, gym.spaces.Dict):
         return space.keys() == other_space.keys() and all(
             _can_observe(space[key], other_space[key]) for key in space

@@ -20,20 +20,16 @@ from sdnn.estimators.columns import Floats
 from sdnn.estimators.outliers import usual_range
 
 EXPERTS = ("network", "linear", "window")
-"""Values of the setting: each has the experts of the former, and others."""
+"""Values of the setting ``experts``: each has the experts of the value before it, and others."""
 
-FORGETTING_OF_MEAN = 0.999
-FORGETTING = (0.999, 0.98)  # of two linear regressions, which are reported as one
-PRIORS = (
-    4.0,
-    2.0,
-    1.0,
-)  # weights of mean and regressions before the errors: simple ones are likely
+FORGETTING_OF_MEAN = 0.999  # factor of a sample's weight with each later sample
+FORGETTING = (0.999, 0.98)  # this factor in two linear regressions, which are reported as one
+PRIORS = (4.0, 2.0, 1.0)  # first weights of mean and regressions: simple experts are likely
 ERROR_LIMIT = 20.0  # largest error that the regressions of numbers learn, in mean errors
 WINDOW = 400  # samples of kernel regression, whose time grows with their square
-LENGTH_SCALE = 1.0  # of its kernel, in ranges of inputs and roots of their number
-RIDGE = 0.1
-MOST_COLUMNS = 200  # of linear regression, whose time grows with their square
+LENGTH_SCALE = 1.0  # length scale of the kernel, in ranges of inputs times the root of their number
+RIDGE = 0.1  # penalty of kernel regression
+MOST_COLUMNS = 200  # columns of linear regression, whose time grows with their square
 
 
 def finite_sum(first: Floats, second: Floats) -> Floats:

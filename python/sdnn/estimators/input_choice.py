@@ -22,15 +22,16 @@ from sdnn.estimators.columns import Array, Floats, Ints
 from sdnn.estimators.ridge import Samples, Solution, apply_degree, diagonal, solve
 from sdnn.estimators.training import Rows
 
-MOST_SAMPLES = 400  # that decide; solving for more would take longer than the fit itself
+MOST_SAMPLES = 400  # samples that decide; solving for more would take longer than the fit itself
 MOST_OUTPUTS = 200  # samples whose outputs are compared, for importances and gradients
-LARGEST_ERROR = 0.97  # of a choice that is taken, as a share of the error before
-LEAST_SIGNIFICANCE = 2.0  # standard errors by which it must be smaller
+LARGEST_ERROR = 0.97  # largest error of a better choice, as a share of the error before
+LEAST_SIGNIFICANCE = 2.0  # standard errors by which the error of a better choice is smaller
 N_DIRECTIONS = 2
-MOST_ROUNDS = 5  # in which directions are sought
-STEP = 0.15  # of gradients, in standard deviations of an input
+MOST_ROUNDS = 5  # rounds in which directions are sought
+STEP = 0.15  # distance of the points whose outputs give a gradient, in standard deviations
 
-Losses = Callable[[Samples, Floats], Floats]  # of samples and of outputs without each of them
+Losses = Callable[[Samples, Floats], Floats]
+"""Returns the loss of each sample from its output by the solution without it."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -89,7 +90,8 @@ def positions(table: Array, codings: Sequence[Coding]) -> Floats:
 def few_samples(table: Array, codings: Sequence[Coding], samples: Samples) -> tuple[Array, Samples]:
     """Draw at most `MOST_SAMPLES`, in an order that does not depend on that of all samples.
 
-    Equal samples become one that weighs as much, so that weights decide as repetitions do.
+    Equal samples become one with the sum of their weights: a sample of weight 2 and two equal ones
+    of weight 1 lead to the same choice.
     """
     columns = [
         table[:, i].astype(np.float64) if coding.even_range() else coding.bins(table[:, i])
@@ -121,8 +123,8 @@ def inputs_to_compare(
 ) -> list[Inputs]:
     """Return the inputs with which all samples are to be solved.
 
-    Where less than half of the samples have decided, these are all features, too: what is too weak
-    for these samples may help when there are more.
+    Where less than half of the samples have decided, all features are compared, too: an input that
+    is too weak to be kept with few samples may help with all of them.
     """
     every = all_inputs(len(codings))
     best = InputChoice(codings, table, samples, degrees, losses).best()
@@ -138,9 +140,9 @@ class Candidate:
 
     inputs: Inputs
     solution: Solution
-    losses: Floats  # raised for directions, shape (n_samples,)
+    losses: Floats  # times the penalty of directions, shape (n_samples,)
     total: Floats  # sum of the inputs' correlations, shape (n_samples, n_samples)
-    kernel: Floats  # before its degree
+    kernel: Floats  # of degree 1, shape (n_samples, n_samples)
 
 
 class InputChoice:
@@ -209,7 +211,7 @@ class InputChoice:
         values: Floats = self._positions @ weights
         return values, RandomInverse().fit(values, N_UNITS)
 
-    def _of_all(self, inputs: Inputs) -> Iterator[Floats]:
+    def _correlations_of_each(self, inputs: Inputs) -> Iterator[Floats]:
         """Yield the correlations of each of the inputs."""
         yield from map(self._correlations, inputs.features)
         for weights in inputs.directions:
@@ -220,7 +222,7 @@ class InputChoice:
     def _solve(self, inputs: Inputs) -> Candidate:
         shape = (len(self._table), len(self._table))
         total, squares = np.zeros(shape), np.zeros(shape)
-        for correlations in self._of_all(inputs):
+        for correlations in self._correlations_of_each(inputs):
             total += correlations
             squares += np.square(correlations)
         n_inputs = len(inputs.features) + len(inputs.directions)
@@ -230,7 +232,7 @@ class InputChoice:
             problem = diagonal(apply_degree(kernel.copy(), degree), self._samples)
             solutions[degree] = solve(problem, self._samples, None)
         degree = min(solutions, key=lambda degree: solutions[degree].error)
-        self._degrees = [degree]  # the degree of all inputs is that of all candidates
+        self._degrees = [degree]  # later candidates have the degree of the first, with all inputs
         solution = solutions[degree]
         losses = self._losses(self._samples, solution.left_out) * self._penalty(inputs)
         return Candidate(inputs, solution, losses, total, kernel)

@@ -38,7 +38,7 @@ from sdnn.support.habits import explains_names
 AUTO = words("auto")
 DEGREES = (1, 2, 3)
 LARGEST_TARGET = 1e140  # so that sums of squares are finite
-LOG_STEEPNESS = (0.0, 5.0)  # bounds, for the softmax of scores
+LOG_STEEPNESS = (0.0, 5.0)  # bounds of the logarithm of the steepness of the softmax of scores
 LOG_OF_TEN = np.log(10.0)
 
 

@@ -17,7 +17,7 @@ from sdnn.estimators.columns import Floats
 from sdnn.estimators.training import Rows
 
 ALPHAS = np.logspace(-6, 0, 19)  # penalties to try, relative to the sum of eigenvalues
-NEGLIGIBLE = 1e-12  # eigenvalues, as shares of the largest
+NEGLIGIBLE = 1e-12  # share of the largest eigenvalue up to which others count as 0
 ROWS_AT_ONCE = 4096
 MOST_LEFT_OUT = 8192  # samples used for leave-one-out with low rank
 

@@ -31,9 +31,10 @@ MOST_PRESENTED = 2**28  # samples in an epoch: their indices take a GiB
 ClassWeight = str | Mapping[Any, float] | None
 Trainer = _core.PDeltaTrainer | _core.PerceptronTrainer
 Rows = NDArray[np.int64]
-MOST_EPOCHS = 30  # by default
-FEWEST_EPOCHS = 5
+MOST_EPOCHS, FEWEST_EPOCHS = 30, 5  # bounds of the default number of epochs
 MOST_PRESENTATIONS = 80_000  # samples presented in all epochs by default
+GOLDEN_RATIO = 0.6180339887498949
+"""Multiples of it, without their whole parts, spread evenly over [0, 1)."""
 
 
 @dataclasses.dataclass
@@ -153,7 +154,7 @@ def samples_of_epoch(n_samples: int, weights: Floats | None, epoch: int, n_befor
     in_order = np.arange(n_samples, dtype=np.int32)
     if weights is None:
         return in_order
-    phases = (n_before + in_order) * 0.6180339887498949 % 1  # spread over the epochs
+    phases = (n_before + in_order) * GOLDEN_RATIO % 1
     times = np.floor(weights * (epoch + 1) + phases) - np.floor(weights * epoch + phases)
     return np.repeat(in_order, times.astype(np.int64))
 

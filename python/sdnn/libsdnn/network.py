@@ -346,6 +346,7 @@ def _parse_input(text: str, n_units: int) -> LibsdnnInput:
 
 
 def _parse_pairs(entries: Entries, n_inputs: int) -> tuple[tuple[int, int], ...]:
+    """Return the pairs (modified, modifier) of inputs: all, those listed, or those of a file."""
     method = entries.one_of("SDNN/SD/combination_setting", "mutual", "saved", "file")
     if method == "mutual":
         if n_inputs * (n_inputs - 1) > MOST_PAIRS:

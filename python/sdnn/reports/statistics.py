@@ -110,6 +110,7 @@ def interval_limits(distribution: FloatArray, confidence: float = CONFIDENCE) ->
 
 
 def _bootstrap(statistic: Callable[..., FloatArray], *groups: ArrayLike) -> Estimate:
+    """Return a statistic of groups of trials, with its interval over resamples of each group."""
     samples = [np.asarray(values, np.float64) for values in groups]
     for sample in samples:
         if sample.ndim != 1 or sample.size == 0:

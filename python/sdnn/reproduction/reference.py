@@ -57,6 +57,7 @@ class ReferenceReports:
         self.keys = sorted(self._digests)
 
     def _key(self, number: int, row: dict[str, str]) -> TrialKey:
+        """Return the key of the trial in a numbered line; RunError if a value is impossible."""
         for name, pattern in (
             ("trial", r"\d{1,6}"), ("root_seed", r"\d{1,19}"), ("config_hash", "[0-9a-f]{16}"),
             ("rows_digest", "[0-9a-f]{16,64}"),

@@ -326,6 +326,7 @@ def cost_table(costs: Sequence[CostRecord]) -> Table:
 
 
 def _cost_cell(cost: CostRecord | None, with_one_less: CostRecord | None) -> str:
+    """Return the median time and its quartiles, and the growth since one input less."""
     if cost is None:
         return "-"
     lower, middle, upper = np.percentile(cost.microseconds, (25, 50, 75))

@@ -160,6 +160,7 @@ def spec_schema() -> Values:
 
 
 def _schema_of_type(field: Field) -> object:
+    """Return the type of a field of the core, annotated with its limits and documentation."""
     limits: Values = {}
     if field.hint in ("int", "float"):
         number = int if field.hint == "int" else float

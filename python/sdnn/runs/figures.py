@@ -135,6 +135,7 @@ def _draw_case(
 def _draw_variant(
     axes: Axes, measured: Measured, name: MeasureName, line: int, color: str, is_reference: bool
 ) -> None:  # fmt: skip
+    """Draw a measure of a variant on its line: a dot per trial, their median, and its interval."""
     result = measured.result
     scale = 100 if name == "final_share_solved" else 1
     values = scale * result.uncensored(name)

@@ -151,6 +151,7 @@ def _alternatives(kind: object) -> tuple[object, ...]:
 
 
 def _expected_value(possible: Iterable[object], text: str) -> str:
+    """Return "must be ..." for one of the possible types, from the text of msgspec's error."""
     choices = [repr(w) for form in possible if get_origin(form) is Literal for w in get_args(form)]
     if choices:
         others = " or an array" if any(get_origin(form) is tuple for form in possible) else ""

@@ -101,6 +101,7 @@ class RunSpec(Settings, frozen=True):
             msgspec.structs.force_setattr(self, name, value)
 
     def _fill_agent(self) -> None:
+        """Set the agent's settings that are not given: those of its preset, or its defaults."""
         entry, preset = self._chosen_agent()
         if preset is None and entry.presets:
             preset = "general"
@@ -144,6 +145,7 @@ class RunSpec(Settings, frozen=True):
         return agent_entry(name), named or preset
 
     def _fill_protocol(self) -> None:
+        """Set protocol and budget where not given; ConfigError if settings do not go together."""
         protocol, budget = self.protocol, self.budget
         if protocol.evaluate_every is protocol.evaluate_every_episodes is None:
             protocol = protocol.replace(evaluate_every=DEFAULT_INTERVAL)
@@ -195,7 +197,8 @@ class RunSpec(Settings, frozen=True):
         return (
             self.entry.core_trial is not None
             and self.environment.is_plain_paper_acrobot
-            and self._optional_settings().items() <= {("history", "auto")}  # without a warm-up
+            # Without a warm-up history="auto" means none.
+            and self._optional_settings().items() <= {("history", "auto")}
             and (protocol.n_envs, protocol.evaluation_episodes) == (1, 1)
             and protocol.evaluate_every_episodes is not None
             and not protocol.seeded_episodes
@@ -344,6 +347,7 @@ class RunSpec(Settings, frozen=True):
         return agent
 
     def _optional_settings(self) -> dict[str, object]:
+        """Return the settings that only some agents have, as far as they are not the default."""
         values = {name: getattr(self.agent, name) for name in _OPTIONAL}
         defaults = AgentSpec(angle_pairs="none", inputs="all", history="none")
         return {k: value for k, value in values.items() if value != getattr(defaults, k)}

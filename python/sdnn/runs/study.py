@@ -185,6 +185,7 @@ class Study:
 
 
 def _require_comparable(spec: RunSpec) -> None:
+    """Raise ConfigError unless every trial is as long as the others, and is evaluated."""
     if spec.budget.target_return is not None:
         raise ConfigError("budget.target_return", "must be omitted in a study")
     unit = "episodes" if spec.budget.steps is None else "steps"

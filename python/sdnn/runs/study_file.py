@@ -364,6 +364,7 @@ class StudyFile(Study):
     def _axis_values(
         self, axis: Setting, name: tuple[str, ...], lasts: Mapping[str, int]
     ) -> Iterator[tuple[str, Layer]]:
+        """Yield a label, such as ``"discount=0.9"``, and the setting for each value of an axis."""
         if not isinstance(axis.value, list) or not axis.value:
             raise self.file.error(axis.where, f"must be an array of values, got {axis.value!r}")
         shown = name[:1] if name == ("agent", "name") else name

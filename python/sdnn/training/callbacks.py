@@ -80,7 +80,7 @@ class SaveBestAgent(Callback):
     """Saves the agent whenever it was better than ever before in this training.
 
     Without ``episodes`` after an evaluation with the highest mean return so far. With ``episodes``
-    after a block of so many learned episodes whose mean return is the highest: that costs no
+    after a block of that many learned episodes whose mean return is the highest: that costs no
     steps, but the returns are those of the agent that still learned and explored. The training
     remembers the best block, and a resumed one continues its block.
 
@@ -97,7 +97,7 @@ class SaveBestAgent(Callback):
         self.episodes = None if episodes is None else whole("episodes", episodes, 1, MOST_IN_BLOCK)
 
     def on_start(self, training: Training) -> None:
-        """Let the training compare blocks of so many episodes."""
+        """Let the training compare blocks of ``episodes`` episodes, if they are given."""
         if self.episodes is not None:
             training.blocks.setdefault(self.episodes, EpisodeBlock(self.episodes))
 

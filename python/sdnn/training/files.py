@@ -209,7 +209,7 @@ _ARRAYS_OF_TRAINING = "training."
 _LARGEST_RETURN = 1e300
 """Returns that count as larger ones, so that sums of a block are finite."""
 MOST_IN_BLOCK = 10**6
-"""Episodes of a block."""
+"""Largest number of episodes in a block."""
 
 _Sum = Annotated[float, msgspec.Meta(ge=-1e307, le=1e307)]
 _BlockLength = Annotated[int, msgspec.Meta(ge=1, le=MOST_IN_BLOCK)]
@@ -278,7 +278,7 @@ class SavedEpisode(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class EpisodeBlock(msgspec.Struct, omit_defaults=True):
-    """The learned episodes of which each ``length`` are compared with the best so many before.
+    """Blocks of ``length`` learned episodes each, of which the best is the one of largest returns.
 
     Blocks do not overlap. ``total`` is the sum of the ``n`` returns of the present block, ``best``
     the largest sum of a whole one.
@@ -310,8 +310,8 @@ class SavedTraining(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=Tru
     """The state that `sdnn.agents.Training` resumes.
 
     ``present`` has an entry for each environment, ``evaluations`` steps and mean returns;
-    ``next_episode`` is the number of the first that has not begun; ``wrappers`` have learned as
-    much when the present episode began.
+    ``next_episode`` is the number of the first that has not begun; ``wrappers`` are the statistics
+    of wrappers when the present episode began.
     """
 
     steps: _Period | None

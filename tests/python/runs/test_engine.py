@@ -39,7 +39,7 @@ def test_teams_have_one_agent_each_and_shrink_as_jobs_increase():
     n_of_agent = 4 * 3  # trials: three in each of four cases
     teams = teams_of(plan, 2)
     assert {planned for team in teams for planned in team} == set(plan)
-    # Of sdnn-c, each runs alone; those of fuzzy and of rbf are divided over two jobs.
+    # Each trial of sdnn-c runs alone; those of fuzzy and of rbf are divided over two jobs.
     assert sorted(map(len, teams)) == [1] * n_of_agent + [n_of_agent // 2] * 2 * 2
     assert all(len({planned.key.agent for planned in team}) == 1 for team in teams)
     assert max(map(len, teams_of(plan, 1))) == MOST_TOGETHER

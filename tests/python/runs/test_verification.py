@@ -104,7 +104,7 @@ def test_trials_are_drawn_evenly_over_cases_and_the_same_by_a_seed(fake_store):
 def test_a_changed_byte_of_a_row_is_found_in_any_trial(fake_store, n_trials):
     path = fake_store / "results.sqlite"
     with sqlite3.connect(path) as connection:
-        # Of the 30 rows of a trial, the first has number 0.
+        # Rows of a trial have the numbers 0 to 29.
         connection.execute("UPDATE rows SET length = 49 WHERE run_id = 3 AND number = 4")
     connection.close()
     for seed in range(4):  # whether or not the trial is drawn
