@@ -17,7 +17,7 @@ int main(int argc, char** argv) try {
   CompiledController agent({.observation = {.low = {-1.0, -2.0}, .high = {1.0, 2.0}},  // m, m/s
                             .action = Box{.low = {-1.0}, .high = {1.0}},               // m/s^2
                             .seed = argc > 2 ? std::stoull(argv[2]) : 1,
-                            .settings = {{"learning.discount", 0.95}, {"warm_up_steps", 500}}});
+                            .settings = {{"learning.discount", 0.9}, {"warm_up_steps", 500}}});
   double distance = 0.0;
   for (int episode = 0; episode < 200; ++episode) {
     std::array<double, 2> cart = {0.01 * (episode * 37 % 199 - 99), 0.0};  // position, speed
