@@ -58,7 +58,8 @@ struct AgentSpec {
 /// The part of a Controller and its file that programs and robots need, with the same bits.
 ///
 /// Programs that include this header compile in seconds and are linked to the CMake target
-/// sdnn::controller, which is compiled once. Shapes, units and errors are those of Controller.
+/// sdnn::controller, which is compiled once. Observations and actions are in the units of the task,
+/// shapes (n_variables,) and (n_dimensions,). An object serves one thread at a time.
 class CompiledController {
  public:
   /// Which actions are allowed, as ActionMask has it; empty: all.
@@ -83,17 +84,28 @@ class CompiledController {
   /// Whether it still acts at random to find the ranges of its observations.
   bool is_warming_up() const noexcept;
 
-  /// Sets the number of environments, each with separate episodes, in [1, 2^14].
+  /// Sets the number of environments or robots, each with separate episodes. Throws
+  /// std::invalid_argument unless n is in [1, 2^14].
   void set_n_environments(std::size_t n);
-  /// Sets the part of the learning that is done, in [0, 1], which schedules of "sdnn-c" follow.
+  /// Sets the part of the learning that is done, for schedules that follow it, as those of "sdnn-c"
+  /// do. Throws std::invalid_argument unless it is in [0, 1].
   void set_progress(double progress);
+  /// Begins an episode: learn does not, even after a terminated transition. Throws
+  /// std::invalid_argument if there is no such environment.
   void begin_episode(std::size_t environment = 0);
+  /// The next acts without `explore` are those of another episode.
   void begin_greedy_episode(std::size_t environment = 0);
 
-  /// Returns the action to take, a best one without `explore`. Valid until the next act.
+  /// Returns the action to take, a best one without `explore`. Valid until the next act. Throws
+  /// std::invalid_argument naming an unusable number of the observation, mask or environment; then
+  /// nothing has changed.
   std::span<const double> act(std::span<const double> observation, bool explore = true,
                               std::size_t environment = 0, Mask mask = {});
 
+  /// Learns a transition. The action may be any one of the task (except with "fuzzy"); `next_mask`
+  /// restricts the next state's actions; dt is the duration in usual steps. Throws
+  /// std::invalid_argument for unusable arguments, and then nothing has changed;
+  /// std::overflow_error for a weight beyond its range.
   void learn(std::span<const double> observation, std::span<const double> action, double reward,
              std::span<const double> next_observation, bool terminated, std::size_t environment = 0,
              Mask next_mask = {}, double dt = 1.0);
