@@ -33,6 +33,22 @@ def skip_unless_ci():
     return _skip
 
 
+@pytest.fixture(scope="module")  # its event loop ends with the module
+def chromium(skip_unless_ci):
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError:
+        skip_unless_ci("needs playwright: pip install playwright")
+    names = ("chromium", "chromium-browser", "google-chrome")
+    path = next(filter(None, map(shutil.which, names)), None)
+    if path is None:
+        skip_unless_ci("needs Chromium: apt install chromium")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
 PACKAGES = dict.fromkeys(("clang", "clang++"), "clang libclang-rt-dev")
 PACKAGES |= dict.fromkeys(("nm", "objdump"), "binutils")
 PACKAGES |= {

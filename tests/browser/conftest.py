@@ -43,22 +43,6 @@ def address(folder):
         thread.join()
 
 
-@pytest.fixture(scope="session")
-def chromium(skip_unless_ci):
-    try:
-        from playwright.sync_api import sync_playwright
-    except ImportError:
-        skip_unless_ci("needs playwright: pip install playwright")
-    names = ("chromium", "chromium-browser", "google-chrome")
-    path = next(filter(None, map(shutil.which, names)), None)
-    if path is None:
-        skip_unless_ci("needs Chromium: apt install chromium")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
-        yield browser
-        browser.close()
-
-
 @pytest.fixture
 def visit(chromium, address):
     """Opens a page in a new context; afterwards it must have had no error or outside request."""

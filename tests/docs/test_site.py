@@ -75,6 +75,33 @@ def test_the_reference_has_every_public_name(site):
             assert text.count(entry) == 1, f"{package}.{name} has no entry, or several"
 
 
+CUT = """
+  [...document.querySelectorAll('.md-content table')].filter((table) => {
+    const around = table.closest('.md-typeset__scrollwrap') ?? table.parentElement;
+    return around.scrollWidth > around.clientWidth + 1;
+  }).length
+"""
+"""How many tables of a page are wider than its column."""
+
+
+def test_pages_fit_the_screen_and_have_a_search_box(site, chromium):
+    names = [name for name, text in pages(site).items() if "md-content" in text]
+    assert len(names) > 40
+    for width in (390, 1280):
+        page = chromium.new_page(viewport={"width": width, "height": 900})
+        for name in names:
+            page.goto((site / name).as_uri())
+            assert page.locator(".md-search__input").count() == 1, name
+            assert page.evaluate("document.documentElement.scrollWidth") <= width, (name, width)
+            assert width < 1280 or page.evaluate(CUT) == 0, name
+        page.close()
+
+
+def test_the_benchmarks_begin_with_their_picture(site):
+    text = (site / "evidence" / "benchmarks" / "index.html").read_text("utf-8")
+    assert re.search(r"</h1>\s*<p><img ", text)
+
+
 def test_doxygen_builds_the_cpp_reference_without_warnings(tmp_path, skip_unless_ci):
     if shutil.which("doxygen") is None:
         skip_unless_ci("needs doxygen")
