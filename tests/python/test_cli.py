@@ -214,13 +214,15 @@ def test_dry_run_opens_the_store_for_reading_only(invoke, tmp_path, monkeypatch)
 
 
 def test_dry_run_counts_measurements_of_costs(invoke, no_costs):
+    n_full, n_quick = 4 * 7, 3 * 7 + 4  # four series of 2 to 8 inputs, one of them up to 5 if quick
     line = "cost of a step: {} measurements, {} of them stored in results"
-    assert invoke("reproduce", "cost", "--dry-run").stdout.splitlines() == [line.format(28, 0)]
-    assert invoke("reproduce", "--dry-run").stdout.splitlines()[-1] == line.format(28, 0)
+    planned = line.format(n_full, 0)
+    assert invoke("reproduce", "cost", "--dry-run").stdout.splitlines() == [planned]
+    assert invoke("reproduce", "--dry-run").stdout.splitlines()[-1] == planned
     last_line = invoke("reproduce", "cost", "--quick").stdout.splitlines()[-1]
     assert re.fullmatch(r"wrote \d+ files: see .*report-quick\.html", last_line)
     dry = invoke("reproduce", "cost", "--quick", "--dry-run").stdout
-    assert dry.splitlines() == [line.format(25, 25)]
+    assert dry.splitlines() == [line.format(n_quick, n_quick)]
     plan = json.loads(invoke("reproduce", "a", "--dry-run", "--json").stdout)
     assert plan["costs"] == {"planned": 0, "stored": 0}
 
@@ -265,7 +267,8 @@ def test_a_preset_is_run_beside_the_papers_agents(invoke, tmp_path, no_costs):
 
 def test_costs_are_measured_for_the_selected_agent_only(invoke, no_costs):
     dry = invoke("reproduce", "cost", "--agent", "rbf", "--dry-run")
-    assert re.findall(r"\d+", dry.stdout) == ["14", "0"]
+    n_planned = 2 * 7  # two series of 2 to 8 inputs
+    assert re.findall(r"\d+", dry.stdout) == [str(n_planned), "0"]
     table = json.loads(invoke("reproduce", "cost", "--agent", "rbf", "--quick", "--json").stdout)
     assert {cost["series"] for cost in table["costs"]} == {"rbf", "rbf-plain"}
     assert {series for series, _ in no_costs} == {"rbf", "rbf-plain"}

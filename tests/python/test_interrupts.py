@@ -77,7 +77,11 @@ class Count(Callback):
         self.n += 1
 
 
-@pytest.mark.parametrize(("times", "saved_at"), [(1, 47), (2, 30)])
+@pytest.mark.parametrize(
+    ("times", "saved_at"),
+    [(1, 47), (2, 30)],
+    ids=["once, saved in its step", "twice, saved by the last checkpoint"],
+)
 def test_a_training_interrupted_by_ctrl_c_resumes_exactly(tmp_path, times, saved_at):
     def make(env, name):
         agent = SDNNQLearning(env.observation_space, env.action_space, seed=1)

@@ -358,8 +358,11 @@ def best_of(tmp_path):
     return steps_after_which_the_best_was_saved
 
 
-def test_save_best_agent_compares_blocks_of_learned_episodes(best_of, tmp_path):
+def test_save_best_agent_compares_blocks_of_learned_episodes(best_of):
     assert best_of((RETURNS_OF_PAIRS, 2)) == [2, 6, 10]
+
+
+def test_save_best_agent_refuses_impossible_lengths_of_blocks(tmp_path):
     for length in (0, 1.5, 10**6 + 1):
         refuses("episodes", SaveBestAgent, tmp_path / "best", length)
 

@@ -82,7 +82,7 @@ def test_stored_measurements_are_not_repeated(tmp_path, measured):
     second = FakeMeasure()
     costs = measured(tmp_path, second)
     assert second.requested == [(s.id, n) for s in SERIES for n in (2, 3)][3:]
-    assert len(costs) == 8
+    assert len(costs) == 2 * len(SERIES)
     third = FakeMeasure()
     again = measured(tmp_path, third)
     assert third.requested == []
@@ -96,9 +96,10 @@ def test_stored_measurements_are_not_repeated(tmp_path, measured):
 def test_costs_of_different_settings_are_stored_separately(tmp_path, measured):
     measured(tmp_path, FakeMeasure())
     other = replace(SMALL, n_rounds=5)
-    assert [len(c.microseconds) for c in measured(tmp_path, FakeMeasure(), other)] == [5] * 8
+    of_other = measured(tmp_path, FakeMeasure(), other)
+    assert [len(c.microseconds) for c in of_other] == [5] * 2 * len(SERIES)
     with ResultStore(tmp_path) as store:
-        assert len(load_costs(store, SMALL.config_hash)) == 8
+        assert len(load_costs(store, SMALL.config_hash)) == 2 * len(SERIES)
         assert store.load() == ()
         assert records_digest(store.load()) == records_digest(())
 
@@ -109,7 +110,7 @@ def test_costs_of_another_machine_or_version_are_measured_again(tmp_path, measur
         with monkeypatch.context() as patched:
             patched.setattr(place, name, (lambda: "another") if place is machine else "9.9.9")
             anew = FakeMeasure()
-            assert len(measured(tmp_path, anew)) == len(anew.requested) == 8
+            assert len(measured(tmp_path, anew)) == len(anew.requested) == 2 * len(SERIES)
 
 
 def test_damaged_costs_are_named(tmp_path, measured):
@@ -120,15 +121,19 @@ def test_damaged_costs_are_named(tmp_path, measured):
         refuses("results.sqlite", load_costs, store, SMALL.config_hash, error=StoreError)
 
 
-def test_table_gives_times_and_growth(tmp_path, measured):
+def test_the_table_of_costs_has_no_row_of_inputs_that_were_not_measured(tmp_path, measured):
     rows = cost_table(measured(tmp_path, FakeMeasure(ends_after=2))).rows
     assert [row[0] for row in rows] == ["2"]
+
+
+def test_the_table_of_costs_gives_medians_quartiles_and_growth(tmp_path, measured):
+    # The three times of 2 inputs are 16, 32 and 48, those of 3 inputs four times as long.
     table = cost_table(measured(tmp_path / "all", FakeMeasure()))
     rows = table.rows
     assert table.header[1:] == (*(s.title for s in SERIES), "FQL's table")
     assert rows[0][1] == "32 us [24, 40]"
     assert rows[1][1] == "128 us [96, 160], 4.0x"
-    assert rows[1][-1] == "0.000729 MB"
+    assert rows[1][-1] == "0.000729 MB"  # 9^3 bytes
 
 
 def test_the_figure_of_costs_shows_the_stored_medians(tmp_path, measured):

@@ -262,12 +262,14 @@ def test_claims_say_which_measures_need_longer_trials(tmp_path, run, collected):
     run(tmp_path, plan_trials(experiment.cases, 2, 0, 100))
     results = collected(experiment, tmp_path, 2, 100)
     report = Report(experiments=((experiment, results),), costs=(), quick=True, seed=0)
-    pictures = {"experiment-b": PICTURES["experiment-a"]}
-    page = report.page(pictures, {"experiment-b": b"narrow"})
+    page = report.page({"experiment-b": PICTURES["experiment-a"]})
     by_number = {row[0]: row[-1] for row in next(page.tables).rows}
     assert by_number["6"] == "episode of collapse, difference: too short to tell"
     assert any("needs more episodes" in note for note in page.notes)
-    html = page.to_html("")
+
+
+def test_the_html_report_has_pictures_for_narrow_screens(report):
+    html = report.page(PICTURES, {"experiment-a": b"narrow"}).to_html("")
     assert "max-width: 640px" in html
     assert base64.b64encode(b"narrow").decode() in html
 

@@ -112,11 +112,13 @@ def test_variants_with_longer_trials_only_do_not_differ(study):
         longer = comparison.measured[case, "long"]
         assert longer.differences[name].value == 0.0
         assert not longer.differs(name)
-    tables = {table.title: table.rows for table in page_of(comparison).tables}
-    rows = tables["Case I: 4 inputs, no noise"]
-    assert [row[6] for row in rows] == [">1,000 [>1,000, >1,000]", ">3,000 [>3,000, >3,000]"]
-    (row,) = tables["Case I: 4 inputs, no noise: minus short, trial by trial"]
-    assert not any("*" in cell for cell in row)
+    tables = {table.title: table for table in page_of(comparison).tables}
+    table = tables["Case I: 4 inputs, no noise"]
+    column = table.header.index("episode of collapse")
+    collapses = [row[column] for row in table.rows]
+    assert collapses == [">1,000 [>1,000, >1,000]", ">3,000 [>3,000, >3,000]"]
+    (row,) = tables["Case I: 4 inputs, no noise: minus short, trial by trial"].rows
+    assert not any("*" in cell for cell in row), "the mark of a difference"
     png, _ = figure_bytes(draw_study(comparison, "footer"))
     assert png.startswith(b"\x89PNG")
 
@@ -140,22 +142,24 @@ def test_claims_of_each_case_are_censored_at_its_last_episode(study):
     ]
 
 
-def test_returns_are_formatted_with_significant_digits():
-    small = Estimate(0.00498, 0.0049, 0.0051)
-    assert format_estimate(small, "final_return", 9) == "0.00498 [0.0049, 0.0051]"
-    assert (
-        format_estimate(Estimate(0.01, 0.01, 0.01), "mean_return", sign="+")
-        == "+0.01 [+0.01, +0.01]"
-    )
-    mixed = Estimate(-0.01, -0.02, 0.01)
+@pytest.mark.parametrize(
+    ("value", "lower", "upper", "text"),
+    [
+        (0.00498, 0.0049, 0.0051, "0.00498 [0.0049, 0.0051]"),  # an interval of 0.0002
+        (-0.04, -0.1, 3.0, "0 [-0.1, 3]"),  # of 3.1
+        (-159.44, -173.9, -149.8, "-159.4 [-173.9, -149.8]"),  # at least one decimal
+        (1234567.8, 1230000.0, 1240000.0, "1,234,567.8 [1,230,000, 1,240,000]"),
+        (0.0, 0.0, 0.0, "0 [0, 0]"),
+    ],
+)
+def test_returns_have_two_significant_digits_of_their_interval(value, lower, upper, text):
+    assert format_estimate(Estimate(value, lower, upper), "final_return") == text
+
+
+def test_differences_of_returns_are_formatted_with_their_signs():
+    same, mixed = Estimate(0.01, 0.01, 0.01), Estimate(-0.01, -0.02, 0.01)
+    assert format_estimate(same, "mean_return", sign="+") == "+0.01 [+0.01, +0.01]"
     assert format_estimate(mixed, "mean_return", sign="+") == "-0.01 [-0.02, +0.01]"
-    assert format_estimate(Estimate(-0.04, -0.1, 3.0), "final_return", 9) == "0 [-0.1, 3]"
-    large = Estimate(1234567.8, 1230000.0, 1240000.0)
-    assert format_estimate(large, "final_return", 9) == "1,234,567.8 [1,230,000, 1,240,000]"
-    assert format_estimate(Estimate(0.0, 0.0, 0.0), "final_return", 9) == "0 [0, 0]"
-    assert format_estimate(Estimate(-159.44, -173.9, -149.8), "final_return", 9) == (
-        "-159.4 [-173.9, -149.8]"
-    )
 
 
 def test_dollar_signs_in_titles_can_be_drawn(study):
@@ -173,7 +177,7 @@ def test_differences_of_fewer_than_six_trials_are_not_called_different(study):
             for n in range(n_trials)
         ]
         comparison = compare(mine, records).measured["s4-noise", "new"]
-        assert comparison.differences["final_steps"].upper == -46.0
+        assert comparison.differences["final_steps"].upper == 4 - 50
         assert comparison.differs("final_steps") is differs
         assert not comparison.differs("mean_return")
 
@@ -331,8 +335,8 @@ def mixed(study):
 def test_other_environments_are_measured_by_their_returns(mixed):
     swing = mixed.measured["swing", "b"]
     assert tuple(swing.result.values) == ("final_return", "mean_return")
-    assert swing.result.values["final_return"].tolist() == [28.5, 28.5]  # the last 2 of 20
-    assert swing.result.values["mean_return"].tolist() == [19.5, 19.5]
+    assert swing.result.values["final_return"].tolist() == 2 * [10 + (18 + 19) / 2]  # last 2 of 20
+    assert swing.result.values["mean_return"].tolist() == 2 * [10 + (0 + 19) / 2]
     assert swing.differences["mean_return"].value == 10.0
     assert swing.solved_at_end is None
 
