@@ -77,9 +77,11 @@ TEST(TimeAgentSteps, BadNumbersAndNoRepetitionsDoNotChangeTheAgent) {
 // Otherwise the memory of potentials would be what is timed.
 TEST(TimeAgentSteps, EveryStepOfALargeNetworkTakesAFullPass) {
   QLearning<SDNNC> agent(SDNNC({.n_inputs = 6}, 1), {}, 1);
-  time_agent_steps(agent, 100, 1);
-  EXPECT_GE(agent.agent_workspace().networks.front().cache().counts().full, 98U);
-  EXPECT_LE(agent.agent_workspace().networks.front().cache().counts().full, 101U);
+  constexpr int kSteps = 100;
+  time_agent_steps(agent, kSteps, 1);
+  const auto n_full = agent.agent_workspace().networks.front().cache().counts().full;
+  EXPECT_GE(n_full, kSteps - 2U);  // a new state may be near the last one
+  EXPECT_LE(n_full, kSteps + 1U);  // with the first act
 }
 
 }  // namespace

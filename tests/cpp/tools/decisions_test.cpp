@@ -24,7 +24,7 @@ TEST(TimeDecisions, ReturnsATimePerDecisionWithoutChangingTheTrial) {
   plain.advance(25);
   EXPECT_EQ(times.size(), static_cast<std::size_t>(timed.n_decisions()));
   EXPECT_EQ(timed.n_decisions(), plain.n_decisions());
-  ASSERT_EQ(timed.rows().size(), 2U);
+  ASSERT_EQ(timed.rows().size(), 2U);  // after 10 and 20 of 25 episodes
   EXPECT_EQ(timed.rows()[1].steps, plain.rows()[1].steps);
   EXPECT_EQ(timed.rows()[1].episode_return, plain.rows()[1].episode_return);
   EXPECT_THROW(time_decisions(timed, -1), std::invalid_argument);

@@ -143,7 +143,7 @@ def test_an_agent_that_is_warming_up_is_refused(trained):
         inspect_run(Run.open(folder))
 
 
-def test_left_out_inputs_and_their_reason_are_shown(trained):
+def test_inputs_that_are_left_out_are_in_the_table_without_influence(trained):
     folder = trained("tests/Dock-v0", steps=2500)
     inspection = inspect_run(Run.open(folder))
     table = inspection.input_table()
@@ -154,7 +154,7 @@ def test_left_out_inputs_and_their_reason_are_shown(trained):
     assert inspection.influences[-1].on_values == 0.0
 
 
-def test_warnings_name_narrow_use_and_collapse(trained, monkeypatch):
+def test_warnings_name_narrow_use_collapse_and_rounded_rewards(trained):
     folder = trained("CartPole-v1", "--range", "1=-500:500", steps=2500)
     inspection = inspect_run(Run.open(folder))
     narrow = [text for text in inspection.warnings() if text.startswith("observation 1 uses only")]

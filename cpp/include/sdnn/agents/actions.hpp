@@ -177,6 +177,7 @@ class Actions {
   static constexpr double kFurthest = 1e300;  // largest bound: the width of a range is finite
   static constexpr double kLargestWhole = 9007199254740992.0;  // 2^53: exact in doubles
 
+  /// Throws std::invalid_argument if the bounds of a dimension are impossible.
   void check(std::size_t d) const {
     const std::string low_name = "action.low[" + std::to_string(d) + "]";
     const std::string high_name = "action.high[" + std::to_string(d) + "]";
@@ -196,6 +197,7 @@ class Actions {
     }
   }
 
+  /// Rounds to a number of the space's type, within its bounds.
   double rounded(double action, std::size_t d) const noexcept {
     switch (config_.number) {
       case ActionNumber::float64:

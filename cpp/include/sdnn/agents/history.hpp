@@ -294,6 +294,7 @@ class HistoryFilter {
     const double change = first - second;
     return circular_[i] ? change - std::round(change) : change;
   }
+  /// Finds the differences that states show as 1: the largest of the experience, and some more.
   void find_largest_differences(const RandomExperience& experience) {
     largest_.assign(n_observed(), kLeastDifference);
     for (std::size_t k = 0; k < experience.states.size(); ++k) {
@@ -303,6 +304,8 @@ class HistoryFilter {
     }
   }
 
+  /// Writes a state: the inputs, then differences or averages of numbers; an observer's estimates
+  /// replace the numbers. All entries are in [0, 1].
   void find_state(std::span<const double> inputs, std::span<const double> last,
                   const Memory& memory, std::span<double> state, Room& room) const {
     const auto clipped = [](double x) { return std::clamp(x, 0.0, 1.0); };

@@ -89,6 +89,8 @@ class LastReadings {
     return is_greedy && !last.greedy.empty() ? last.greedy : last.learned;
   }
 
+  /// Returns the observation with the last readings in the place of missing ones, in `room`; of a
+  /// symbol all of its variables are replaced. Without hold it is returned unchanged.
   std::span<const double> filled(std::span<const double> observation, std::span<const double> last,
                                  std::vector<double>& room) const {
     if (!is_held_ || observation.size() != n_variables_) return observation;

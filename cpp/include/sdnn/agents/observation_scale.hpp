@@ -113,6 +113,7 @@ class ObservationScale {
   }
 
  private:
+  /// Throws std::invalid_argument if input k has impossible variables.
   void check(std::size_t k) const {
     const ObservedInput& input = inputs_[k];
     const std::string name = "observation.inputs[" + std::to_string(k) + "]";
@@ -138,6 +139,7 @@ class ObservationScale {
            (input.kind == ObservedKind::angle && !std::isfinite(observation[input.second]));
   }
 
+  /// The middle of the bin of input k; the last of its n + 1 bins is for missing readings.
   double coded(std::size_t k, std::span<const double> observation) const noexcept {
     const std::size_t n = n_bins_[k];
     const std::size_t bin = is_missing(inputs_[k], observation)
@@ -164,6 +166,7 @@ class ObservationScale {
     return (core::atan2(sine, cosine) + core::kPi) / core::kTwoPi;
   }
 
+  /// The value of an input without missing readings; a number may be outside [0, 1].
   double value(const ObservedInput& input, std::span<const double> observation) const noexcept {
     const std::size_t i = input.first;
     if (input.kind == ObservedKind::angle) {

@@ -286,6 +286,8 @@ class Observations {
     present = role;
   }
 
+  /// Returns the ranges that are known without a fit: by the configuration, running ones, and
+  /// [-1, 1] in pairs. Others are NaN.
   Ranges fixed_ranges(const Pairs& pairs) const {
     const double unknown = std::numeric_limits<double>::quiet_NaN();
     Ranges ranges{std::vector<double>(n_variables(), unknown),
@@ -313,6 +315,7 @@ class Observations {
     return ranges;
   }
 
+  /// The range of a variable in the configuration, if both ends are given and finite.
   std::optional<std::pair<double, double>> fixed_range(std::size_t i) const {
     const double infinity = std::numeric_limits<double>::infinity();
     const double low = config_.low[i].value_or(-infinity);
@@ -356,6 +359,7 @@ class Observations {
     return config_.relevant_only && inputs_with(pairs).size() > kAlwaysKept;
   }
 
+  /// Finds neighbouring variables that are cosine and sine of an angle.
   Pairs pairs_in(std::span<const double> seen) const {
     Pairs pairs;
     for (std::size_t i = 0; i + 1 < n_variables(); ++i) {
@@ -369,6 +373,7 @@ class Observations {
     return pairs;
   }
 
+  /// Lists the inputs of states in the order of their first variables; each pair is an angle.
   std::vector<ObservedInput> inputs_with(const Pairs& pairs) const {
     std::vector<ObservedInput> of_variable(n_variables());
     std::vector<bool> is_part(n_variables());

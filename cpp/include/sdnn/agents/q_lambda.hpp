@@ -283,6 +283,8 @@ class QLambda : public IndexAgent<QLambda> {
   }
 
   void apply_rates(const auto& /*change*/) { apply_rates(); }
+  /// Sets learning rate and epsilon: those that were set by hand, or by schedules of the steps
+  /// learned or of the progress.
   void apply_rates() {
     double rate = rates_.learning_rate(config_);
     double epsilon = rates_.epsilon(config_);

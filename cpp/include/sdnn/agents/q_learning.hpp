@@ -329,6 +329,8 @@ class QLearning : public IndexAgent<QLearning<Q>> {
     return sum / static_cast<double>(n_dimensions());
   }
 
+  /// Learns the oldest step of the buffer; `value` is that of the state after the last one. Each
+  /// dimension moves by the error of the mean over dimensions.
   void learn_oldest(NStepBuffer& buffer, double value) {
     const double target = buffer.return_of_oldest(value, config_.discount);
     const NStepBuffer::Step& oldest = buffer.take_oldest();

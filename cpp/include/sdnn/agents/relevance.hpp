@@ -131,6 +131,7 @@ class Relevance {
     }
   };
 
+  /// Returns the series of the experience whose dependences are tested.
   Series all_series() const {
     const std::size_t n_inputs = experience_.n_inputs;
     Series series;

@@ -160,6 +160,7 @@ class ReturnRange {
     }
   }
 
+  /// Counts a return, and remembers it if that is due, in the place of the oldest one.
   void note_return(double value) {
     if (++n_returns_ < due_) return;
     due_ = n_returns_ + returns_between(n_returns_);
@@ -171,6 +172,8 @@ class ReturnRange {
     }
   }
 
+  /// Sets the range by the remembered returns if it has to be wider, or may be half as wide;
+  /// returns whether it was changed.
   bool follow() noexcept {
     if (n_returns_ < kFewReturns) return false;
     std::array<double, kMostReturns> sorted;

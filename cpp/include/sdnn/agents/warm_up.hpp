@@ -224,6 +224,7 @@ class WarmUp {
     dts_.push_back(dt);
   }
 
+  /// Checks what was read from a file: all lists belong to the same transitions.
   template <class Archive>
   void check(Archive& archive) const {
     const std::size_t n = size();

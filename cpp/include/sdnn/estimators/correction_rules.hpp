@@ -83,6 +83,8 @@ class PDeltaRule {
   }
 
  private:
+  /// Appends corrections of the units of a group that are nearest to their threshold: units that
+  /// do not fire where the deficit is positive, else firing ones, a share of the deficit in number.
   void correct_group(const std::int32_t* potentials, std::size_t first_unit, std::int32_t deficit,
                      std::vector<Correction>& corrections) {
     const std::int32_t direction = deficit > 0 ? 1 : -1;

@@ -133,6 +133,7 @@ class OnlineLayer {
     slots_.read({words_.data(), positive});
   }
 
+  /// Corrects the units in `corrections_` by the code that was read, and records that for `undo`.
   void correct(std::size_t sample) {
     for (const std::int32_t direction : {1, -1}) {
       Done now{sample, direction, {}};
@@ -147,6 +148,7 @@ class OnlineLayer {
     }
   }
 
+  /// Takes back all recorded corrections, the last one first.
   void undo(std::span<const std::int32_t> bins) {
     const std::size_t n_inputs = layer_->code().n_inputs();
     for (; !done_.empty(); done_.pop_back()) {

@@ -230,12 +230,15 @@ class RecursiveLeastSquares {
     for (std::size_t row = 0; row < n; ++row) covariance_[row * n + row] = kFirstVariance;
   }
 
+  /// Adds `size` times the gains to the weights of output o, which become 0 if one is not finite.
   void correct(std::size_t o, std::span<const double> gains, double size) noexcept {
     double* const weights = &weights_[o * gains.size()];
     for (std::size_t i = 0; i < gains.size(); ++i) weights[i] += gains[i] * size;
     if (!core::are_finite({weights, gains.size()})) std::fill_n(weights, gains.size(), 0.0);
   }
 
+  /// Updates the covariance of the weights by a sample. Forgetting lets it grow where inputs do not
+  /// vary, so its trace is limited; it begins anew if it has overflowed.
   void update_covariance(std::span<const double> gains, double factor) noexcept {
     const std::size_t n = gains.size();
     const double growth = 1.0 / forgetting_;

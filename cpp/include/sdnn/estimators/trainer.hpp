@@ -113,6 +113,7 @@ class Trainer {
     }
   }
 
+  /// Makes the training of the chosen form, with the smallest integers that hold inner products.
   void make_training(std::span<const std::int32_t> bins, int n_threads, bool keeps_plans) {
     const auto make = [&]<class Form>(std::in_place_type_t<Form> form, auto... more) {
       training_ = std::make_unique<Training>(form, layer_, bins, n_threads, more...);

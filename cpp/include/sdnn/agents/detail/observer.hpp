@@ -198,6 +198,7 @@ class Observer {
     return circular_[i] ? change - core::kTwoPi * std::round(change / core::kTwoPi) : change;
   }
 
+  /// Finds the means and standard deviations by which numbers become coordinates.
   void find_scale(const RandomExperience& experience) {
     const auto n = static_cast<double>(experience.size());
     means_.assign(n_inputs(), 0.0);
@@ -265,6 +266,7 @@ class Observer {
     return 1 + n_inputs() + n_angles + levels_.size();
   }
 
+  /// Lists the features of the linear model: 1, the estimates, and those of the action.
   void find_features(std::span<const double> action, std::span<const double> estimates,
                      std::vector<double>& features) const {
     features.assign(1, 1.0);
@@ -383,6 +385,7 @@ class Observer {
   }
   static std::ptrdiff_t offset(std::size_t n) noexcept { return static_cast<std::ptrdiff_t>(n); }
 
+  /// Checks what was read from a file.
   void check(const auto& archive) const {
     const auto is_near = [](double x) { return x >= -1.0 && x <= 2.0; };
     const auto is_wide = [](double x) { return x >= kLeastDeviation / 2.0 && x <= 2.0; };

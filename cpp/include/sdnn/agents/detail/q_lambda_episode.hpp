@@ -32,7 +32,8 @@ struct QLambdaEpisode {
   Exploration::Episode exploration;
 };
 
-/// Lists an episode; see core/state.hpp. Reading one reads its state by the readout.
+/// Lists the members of an episode that are saved and restored; see core/state.hpp. The code of a
+/// restored state is computed by the readout.
 template <class Readout, class Episode, class Archive>
 void serialize_episode(Readout& readout, const Exploration& exploration, Episode& episode,
                        Archive& archive) {

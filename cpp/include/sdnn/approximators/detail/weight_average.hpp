@@ -115,6 +115,7 @@ class WeightAverage {
     return std::max(static_cast<int>(std::bit_width(n_corrections / passed)) - 4, 0);
   }
 
+  /// Moves the average towards the layer's present weights and thresholds, by a share of 2^-shift.
   void add(const HiddenLayer& layer, int shift) {
     const std::int32_t half = shift > 0 ? 1 << (shift - 1) : 0;
     std::int16_t* average = weights_.data();

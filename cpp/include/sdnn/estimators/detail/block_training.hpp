@@ -64,6 +64,7 @@ class BlockTraining {
     if (chunk_norm_ <= kLargestSum) weights_ = Narrow(std::get<Wide>(weights_));
   }
 
+  /// Presents samples in order; the rule corrects the units after each of them.
   template <class Rule>
   TrainingCount present(std::span<const std::int32_t> order, Rule& rule) {
     TrainingCount count;
@@ -155,6 +156,7 @@ class BlockTraining {
     return true;
   }
 
+  /// Presents a block of samples; makes their plan if it is empty.
   template <class Rule>
   TrainingCount present_block(std::span<const std::int32_t> samples, Plan* plan, Rule& rule) {
     encode(samples);
@@ -175,6 +177,7 @@ class BlockTraining {
     return {active, active + n_words_};
   }
 
+  /// Computes the codes of a block's samples.
   void encode(std::span<const std::int32_t> samples) {
     const ParallelPerceptron::Code& code = layer_->code();
     team_.run_over(samples.size(), [&](std::size_t b) {
@@ -187,6 +190,7 @@ class BlockTraining {
     });
   }
 
+  /// Computes the inner products of a block's codes, and the walks from code to code in each chunk.
   void make_plan(std::span<const std::int32_t> samples, Plan* plan) {
     plan->stride = core::round_up(samples.size(), PresentationWindow::kAtOnce);
     plan->products = core::AlignedBuffer<Product>(samples.size() * plan->stride);
@@ -209,6 +213,7 @@ class BlockTraining {
     for (std::size_t k = 0; k < chunks_.size(); ++k) walks.find(chunks_[k], plan->walks[k]);
   }
 
+  /// Computes the potentials of a block's samples with the present weights and thresholds.
   void sum_potentials(std::size_t n_samples, std::span<const CodeWalk> walks) {
     const std::size_t n_padded = layer_->n_padded_units();
     for (std::size_t b = 0; b < n_samples; ++b) {
@@ -219,6 +224,7 @@ class BlockTraining {
     transpose(potentials_.data(), n_padded, n_samples, n_padded, window_.row(0), window_.stride());
   }
 
+  /// Adds the weights of a block's codes to the potentials, whose units the threads divide.
   template <class Weight>
   void add_walks(const ChunkedWeights<Weight>& weights, std::size_t n_samples,
                  std::span<const CodeWalk> walks) {
@@ -245,6 +251,7 @@ class BlockTraining {
     });
   }
 
+  /// Changes the weights by all corrections of a block at once.
   void correct_weights() {
     widen_before_sums_overflow();
     const auto correct = [&](auto& weights) {

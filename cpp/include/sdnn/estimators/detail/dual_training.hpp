@@ -64,6 +64,7 @@ class DualTraining {
     });
   }
 
+  /// Presents samples in order; the rule corrects the units after each of them.
   template <class Rule>
   TrainingCount present(std::span<const std::int32_t> order, Rule& rule) {
     TrainingCount count;
