@@ -40,7 +40,7 @@ def test_a_fifth_of_each_class_is_held_out():
     assert held_out_fifth(np.zeros(100), False, 3).sum() == 20
 
 
-def test_the_steepness_has_the_smallest_log_loss_on_the_held_out_fifth(tmp_path):
+def test_the_steepness_has_the_smallest_log_loss_on_the_held_out_fifth():
     points, labels = load_iris(return_X_y=True)
     plain = SDNNClassifier(**OPTIONS).fit(points, labels)
     model = SDNNClassifier(**OPTIONS, calibrate=True).fit(points, labels)
@@ -63,6 +63,12 @@ def test_the_steepness_has_the_smallest_log_loss_on_the_held_out_fifth(tmp_path)
 
     best = min(map(loss, np.geomspace(*STEEPNESSES, 1000)))
     np.testing.assert_allclose(loss(model.steepness_), best, rtol=1e-4)
+
+
+def test_probabilities_of_a_calibrated_model_have_its_steepness_also_when_loaded(tmp_path):
+    points, labels = load_iris(return_X_y=True)
+    plain = SDNNClassifier(**OPTIONS).fit(points, labels)
+    model = SDNNClassifier(**OPTIONS, calibrate=True).fit(points, labels)
     raised = plain.predict_proba(points) ** (model.steepness_ / STEEPNESS)
     expected = raised / raised.sum(axis=1, keepdims=True)
     np.testing.assert_allclose(model.predict_proba(points), expected)

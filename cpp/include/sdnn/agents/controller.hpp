@@ -174,7 +174,7 @@ class Controller : public WithRates<Controller> {
     return action_;
   }
 
-  /// Makes the memory of a reader. Requires that the warm-up is over.
+  /// Makes the memory of a thread that calls `best_action`. Requires that the warm-up is over.
   Workspace workspace() const {
     return {std::visit([](const auto& agent) { return AnyWorkspace(agent.workspace()); }, *agent_),
             std::vector<double>(state_.size()),

@@ -22,7 +22,8 @@ class LatestTransitions {
   }
   void begin_episode(std::size_t environment) { latest_.begin_episode(environment); }
 
-  /// Takes a transition. Returns whether there are n_steps to look at, which `forget` ends.
+  /// Counts a transition, and remembers it if it is one of the last n_steps before such a time.
+  /// Returns whether all n_steps are remembered: then look at them, and call `forget`.
   bool learn(const WarmUp::Step& step) {
     const bool is_noted = n_seen_ >= next_time() - n_steps_;
     ++n_seen_;
