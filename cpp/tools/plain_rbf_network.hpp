@@ -71,7 +71,7 @@ class PlainRBFNetwork {
     }
   }
 
-  // state_exponents = those of the joint bases of the state, row-major over the inputs.
+  // Computes state_exponents, the exponents of the state's joint bases, row-major over the inputs.
   void add_up_exponents(std::span<const double> state, Workspace& workspace) const noexcept {
     auto& [network, sums, exponents] = workspace;
     sums[0] = 0.0;

@@ -1,4 +1,4 @@
-/// How everything here is timed: call by call, so that whoever reads the times can take medians.
+/// Timing of a function call by call, so that whoever reads the times can take medians.
 #pragma once
 
 #include <algorithm>

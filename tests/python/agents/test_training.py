@@ -633,7 +633,7 @@ def test_n_step_transitions_of_an_abandoned_episode_are_learned_on_resuming(tmp_
     Training(
         corridor_agent(learning=learning), env, steps=200, callbacks=[Stop(20, tmp_path / "t")]
     ).run()
-    with_training = Training.load(tmp_path / "t", Corridor(), steps=21, repeat_episodes=False)
+    with_training = Training.load(tmp_path / "t", Corridor(), steps=20 + 1, repeat_episodes=False)
     with_training.run()
     by_hand, at = load_agent(tmp_path / "t"), Corridor()
     observation, _ = at.reset(seed=env.seeds[-1])

@@ -213,7 +213,8 @@ def test_features_that_come_late_and_go_are_learned_by_regression(river, experts
     assert set(model.mixed.columns.numbers) == {"x0", "x1", "x2"}
     assert set(model.mixed.columns.categories["word"]) == {"up", "down"}
     assert np.mean(errors[-200:]) < 0.02
-    assert model.predict_one({}) == model.predict_one({"x0": None, "other": 3.0})
+    nothing_known = {"x0": None, "other": 3.0}
+    assert model.predict_one({}) == model.predict_one(nothing_known)
 
 
 def test_classes_with_a_linear_boundary_have_better_probabilities_with_regression(river):
