@@ -19,7 +19,7 @@ namespace detail {
 
 SDNN_WIDE_VECTORS_BEGIN
 
-/// Four rows at a time, so that a piece of the input is loaded once for all of them.
+/// Multiplies four rows at a time, so that a piece of the input is loaded once for all of them.
 SDNN_INLINE void multiply_body(const float* weights, std::size_t n_rows, std::size_t n_columns,
                                const float* input, float* out) noexcept {
   std::size_t i = 0;

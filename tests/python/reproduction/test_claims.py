@@ -21,6 +21,10 @@ from sdnn.runs import Estimate, TrialKey, measure
 
 CASES = {case.id: case for experiment in EXPERIMENTS for case in experiment.cases}
 
+LEARNED_SOON, SOLVED_AT_END, LEARNED_BY_FUZZY, UNSTABLE_FUZZY = 1, 2, 3, 4
+LATER_COLLAPSE, LEARNED_AS_SOON, GROWTH_OF_COSTS = 6, 8, 9
+"""Claims by their numbers in REPRODUCTION.md."""
+
 
 def result(case_id, agent, steps, n_trials=10, n_tests=1500):
     """Trials that take the given steps in every test episode; one value, or one per trial."""
@@ -96,40 +100,45 @@ def test_the_nine_claims_refer_to_planned_cases_and_agents():
 
 
 def test_claims_hold_for_good_trials_and_fail_for_bad_ones():
-    # Claims 1 and 2 are about these two cases.
     good = verdicts([result("s4", "sdnn-c", 4), result("s6", "sdnn-c", 4)])
-    assert good[1] == good[2] == Verdict.HOLDS
-    assert good[8] == Verdict.NOT_RUN  # the noisy cases are missing
-    assert 3 not in good  # a claim about fuzzy Q-learning alone
+    assert good[LEARNED_SOON] == good[SOLVED_AT_END] == Verdict.HOLDS
+    assert good[LEARNED_AS_SOON] == Verdict.NOT_RUN  # the noisy cases are missing
+    assert LEARNED_BY_FUZZY not in good
     bad = verdicts([result("s4", "sdnn-c", 50), result("s6", "sdnn-c", 4)])
-    assert bad[1] == bad[2] == Verdict.FAILS
+    assert bad[LEARNED_SOON] == bad[SOLVED_AT_END] == Verdict.FAILS
 
 
-def test_claim_4_depends_on_the_final_steps_of_fuzzy_q_learning():
-    cases = ("s4-noise", "s5-noise", "s6-noise")
-    assert verdicts([result(case, "fuzzy", 50) for case in cases])[4] == Verdict.HOLDS
-    assert verdicts([result(case, "fuzzy", 7) for case in cases])[4] == Verdict.FAILS
+def test_the_claim_that_fuzzy_q_learning_is_unstable_with_noise_fails_if_it_solves_the_task():
+    def judged(steps):
+        cases = ("s4-noise", "s5-noise", "s6-noise")
+        return verdicts([result(case, "fuzzy", steps) for case in cases])[UNSTABLE_FUZZY]
+
+    assert judged(50) == Verdict.HOLDS
+    assert judged(7) == Verdict.FAILS
 
 
-def test_claims_count_censored_values_as_the_last_episode():
-    late, early = result("s5-noise", "sdnn-c", 4), result("s4-noise", "sdnn-c", 50)
-    (outcome,) = (o for o in judge_claims([late, early], ()) if o.claim.number == 6)
-    assert outcome.checks[0].estimate == Estimate(*3 * [float(PAPER_EPISODES)])
-    assert outcome.verdict == Verdict.HOLDS
-    same = judge_claims([late, result("s4-noise", "sdnn-c", 4)], ())
-    assert next(o for o in same if o.claim.number == 6).verdict == Verdict.FAILS
+def test_a_difference_of_collapses_counts_none_as_the_last_episode():
+    def judged(steps_of_fewer_inputs):
+        fewer = result("s4-noise", "sdnn-c", steps_of_fewer_inputs)
+        outcomes = judge_claims([result("s5-noise", "sdnn-c", 4), fewer], ())
+        return next(o for o in outcomes if o.claim.number == LATER_COLLAPSE)
+
+    never_learned = judged(50)  # which counts as a collapse at episode 0
+    assert never_learned.checks[0].estimate == Estimate(*3 * [float(PAPER_EPISODES)])
+    assert never_learned.verdict == Verdict.HOLDS
+    assert judged(4).verdict == Verdict.FAILS, "neither collapses"
 
 
 def test_evenly_split_trials_leave_a_claim_undecided():
     split = [4] * 5 + [50] * 5
     judged = verdicts([result("s4", "sdnn-c", split), result("s6", "sdnn-c", 4)])
-    assert judged[2] == Verdict.UNDECIDED
+    assert judged[SOLVED_AT_END] == Verdict.UNDECIDED
 
 
 @pytest.mark.parametrize("size", [{"n_trials": 9}, {"n_tests": 1499}])
 def test_fewer_trials_or_episodes_than_the_papers_are_not_judged(size):
     judged = verdicts([result("s4", "sdnn-c", 4, **size), result("s6", "sdnn-c", 4)])
-    assert judged[1] == judged[2] == Verdict.NOT_JUDGED
+    assert judged[LEARNED_SOON] == judged[SOLVED_AT_END] == Verdict.NOT_JUDGED
 
 
 COSTS = [
@@ -140,7 +149,7 @@ COSTS = [
 
 def test_the_growth_of_costs_is_a_ratio_of_medians():
     (outcome,) = judge_claims([], COSTS)
-    assert outcome.claim.number == 9
+    assert outcome.claim.number == GROWTH_OF_COSTS
     growths = [checked.estimate for checked in outcome.checks]
     assert growths[0] == Estimate(5.0, 5.0, 5.0)
     assert (growths[1].value, growths[1].lower, growths[1].upper) == (210.0, 200.0, 220.0)

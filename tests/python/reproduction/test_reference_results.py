@@ -139,10 +139,11 @@ def test_reference_trials_decide_claims_only_with_all_cases():
     outcomes = {
         outcome.claim.number: outcome for outcome in judge_claims(results, reference=reference)
     }
-    assert outcomes[2].verdict == Verdict.UNDECIDED
-    assert outcomes[2].more.checks[0].estimate.value == 4
-    assert outcomes[2].decided == Verdict.HOLDS
-    assert outcomes[8].more is None  # the noisy cases are missing
+    solved_at_end, learned_as_soon = outcomes[2], outcomes[8]  # claims by their numbers
+    assert solved_at_end.verdict == Verdict.UNDECIDED
+    assert solved_at_end.more.checks[0].estimate.value == 4
+    assert solved_at_end.decided == Verdict.HOLDS
+    assert learned_as_soon.more is None  # the noisy cases are missing
     without_s6 = judge_claims(results, reference=reference[:1])
     assert [outcome.more for outcome in without_s6] == [None] * len(outcomes)
 

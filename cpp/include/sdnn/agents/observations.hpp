@@ -97,8 +97,8 @@ class Observations {
   }
   /// Whether there is one input only, which may have to be given twice.
   bool has_single_input() const { return inputs_with(pairs_).size() == 1; }
-  /// Whether a single input is given as often as the approximator needs inputs; if not, once. See
-  /// HistoryFilter, which adds others. Requires that nothing was left out.
+  /// Sets whether a single input is given as often as the approximator needs inputs, or once where
+  /// a HistoryFilter adds others. Requires that nothing was left out.
   void repeat_input(bool is_repeated) {
     repeats_input_ = is_repeated;
     if (scale_) take_inputs(inputs_with(pairs_));

@@ -30,7 +30,7 @@ class RangeNotes {
         most_(std::clamp(kMostValues / n_variables, kRare, kMostNoted)),
         n_until_noted_(gap()) {}
 
-  /// Shape: (n_variables,).
+  /// Notes one in about eight observations, in the place of an old one. Shape: (n_variables,).
   void note(std::span<const double> observation) {
     if (--n_until_noted_ > 0) return;
     n_until_noted_ = gap();

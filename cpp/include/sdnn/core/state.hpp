@@ -86,7 +86,7 @@ class Nested {
   void part(std::string_view name, Part& part) {
     within(name, [&] { std::remove_const_t<Part>::serialize(part, static_cast<Archive&>(*this)); });
   }
-  /// The entries of `list`, prefixed by `name`.
+  /// Calls `list()`, whose entries get names that begin with `name`.
   template <class List>
   void within(std::string_view name, const List& list) {
     const Prefixed prefixed(prefix, name);

@@ -142,7 +142,7 @@ inline void add_columns_portable(const std::int8_t* block, const ColumnPlaces& p
 
 #if SDNN_NEON_KERNELS
 
-/// The columns of a group are added in 8 bits; adding their sum to those of 16 bits widens it.
+/// Adds the columns of each group in 8 bits, and their sum, which this widens, to sums of 16 bits.
 template <std::size_t Group>
 void add_groups_neon(const std::int8_t* block, const ColumnPlaces& places, int factor,
                      std::int32_t* sums) {

@@ -267,7 +267,8 @@ class BlockTraining {
     for (auto& rows : pending_) rows.clear();
   }
 
-  /// Each correction increases the sum of |weights| of a unit in a chunk by at most its columns.
+  /// Widens the weights to 32 bits if the coming corrections could let a sum overflow 16 bits: each
+  /// adds at most 1 to a weight, so at most kChunkColumns to a unit's sum in a chunk.
   void widen_before_sums_overflow() {
     const auto* const narrow = std::get_if<Narrow>(&weights_);
     if (narrow == nullptr) return;

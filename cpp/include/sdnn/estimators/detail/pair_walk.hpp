@@ -95,7 +95,7 @@ class PairWalks {
     }
   }
 
-  /// The walk through the codes in a chunk.
+  /// Finds the walk through the codes of all samples in a chunk.
   void find(const PairChunk& chunk, CodeWalk& walk) {
     const Input& one = inputs_[chunk.one];
     const Input& other = inputs_[chunk.other];
@@ -123,6 +123,8 @@ class PairWalks {
     std::vector<std::uint32_t> sorted;  // samples by bins
   };
 
+  /// Orders the samples by strips of one input, and within these by the other input, upwards and
+  /// downwards in turn.
   void sort(const Input& one, const Input& other) {
     begins_.assign(one.begins.begin(), one.begins.end() - 1);
     ends_.assign(one.begins.begin() + 1, one.begins.end());
@@ -132,6 +134,7 @@ class PairWalks {
     }
   }
 
+  /// Appends the code of a sample in a chunk.
   void add_code(const PairChunk& chunk, std::uint32_t sample) {
     ChunkCode& code = codes_.emplace_back();
     for (std::size_t k = 0; k < chunk.words.size(); ++k) {
