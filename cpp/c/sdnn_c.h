@@ -36,8 +36,12 @@ static inline sdnn_real sdnn_uniform(sdnn_random* random) {
 
 /* The change of a weight, which is twice as large for half a sum or half a difference. */
 static inline int32_t sdnn_change(uint32_t column, int32_t change) {
-  const uint32_t n = UINT32_C(1) * SDNN_N_DOUBLE_GROUPS * SDNN_N_PATTERN_UNITS;
-  return n == SDNN_N_COLUMNS || column < n ? 2 * change : change;
+#if SDNN_N_DOUBLE_GROUPS > 0 && SDNN_N_DOUBLE_GROUPS < SDNN_N_GROUPS
+  return column < UINT32_C(1) * SDNN_N_DOUBLE_GROUPS * SDNN_N_PATTERN_UNITS ? 2 * change : change;
+#else
+  (void)column;
+  return SDNN_N_DOUBLE_GROUPS > 0 ? 2 * change : change;
+#endif
 }
 
 /* A state, and the potentials of all hidden units in it, which are kept up to date. */

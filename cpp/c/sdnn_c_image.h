@@ -23,8 +23,10 @@ static inline void sdnn_carry_head(sdnn_agent* agent, uint8_t* head, int reads) 
   at = sdnn_carry_scale(at, &agent->scale, reads);
   at = sdnn_carry_64(at, &agent->progress, 1, reads);
   at = sdnn_carry_64(at, &agent->q_low, 1, reads);
+#if !SDNN_ADAPTS
+  sdnn_carry_64(at, &agent->q_high, 1, reads);
+#else
   at = sdnn_carry_64(at, &agent->q_high, 1, reads);
-#if SDNN_ADAPTS
   at = sdnn_carry_64(at, &agent->low, 1, reads);
   at = sdnn_carry_64(at, &agent->high, 1, reads);
   at = sdnn_carry_64(at, &agent->sum, 1, reads);
@@ -118,9 +120,9 @@ static inline int sdnn_is_head(const uint8_t* head) {
   if (!sdnn_is_range(head)) return 0;
 #endif
   return sdnn_are_generators(head + 16) && sdnn_get(head + 8, 4) == SDNN_FRACTION_BITS &&
-         sdnn_get(head + 12, 4) <= SDNN_START_STEPS && sdnn_get(head + 196, 8) <= SDNN_ONE &&
-         sdnn_is_real(q_low) && sdnn_is_real(q_high) && sdnn_less(q_low, q_high) &&
-         sdnn_is_scale(head + 176);
+         sdnn_get(head + 12, 4) < UINT64_C(1) + SDNN_START_STEPS &&
+         sdnn_get(head + 196, 8) <= SDNN_ONE && sdnn_is_real(q_low) && sdnn_is_real(q_high) &&
+         sdnn_less(q_low, q_high) && sdnn_is_scale(head + 176);
 }
 
 /* Whether the returns, thresholds and weights in a part of an image are in range. */

@@ -6,8 +6,12 @@
 
 /* Whether an action may be random in this step of an episode. */
 static inline int sdnn_may_explore(uint32_t step) {
-  const uint32_t n = SDNN_N_GREEDY_STEPS;
-  return step >= n;
+#if SDNN_N_GREEDY_STEPS > 0
+  return step >= SDNN_N_GREEDY_STEPS;
+#else
+  (void)step;
+  return 1;
+#endif
 }
 
 /* The number of steps that a random action lasts: n with probability 1 / (n (n + 1)), at most

@@ -36,9 +36,9 @@ static inline int sdnn_is_possible(const sdnn_part* part);
 
 /* Writes the bytes of a part that are in the image's content. */
 static inline void sdnn_write_content(const sdnn_agent* agent, const sdnn_part* part) {
-  uint8_t head[SDNN_IMAGE_HEAD];
-  uint32_t i;
   if (part->offset < SDNN_IMAGE_HEAD) {
+    uint8_t head[SDNN_IMAGE_HEAD];
+    uint32_t i;
     sdnn_carry_head((sdnn_agent*)agent, head, 0);
     sdnn_put(sdnn_put(head, SDNN_IMAGE_MAGIC, 4), SDNN_FINGERPRINT, 4);
     for (i = 0; i < part->n && part->offset + i < SDNN_IMAGE_HEAD; ++i) {

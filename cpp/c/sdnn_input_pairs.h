@@ -51,7 +51,7 @@ static inline int32_t sdnn_sign_of(const uint32_t* bins, const sdnn_pair* pair, 
 #endif
 
 static inline void sdnn_encode(const uint32_t* bins, sdnn_code* code) {
-  sdnn_column* positive = code->columns;
+  sdnn_column* positive = &code->columns[0];
   sdnn_column* negative = code->columns + SDNN_MOST_COLUMNS;
   uint32_t p, unit, column = 0;
   for (p = 0; p < SDNN_N_PAIRS; ++p) {

@@ -67,7 +67,7 @@ static inline void sdnn_refine_unit(sdnn_agent* agent, int32_t size) {
   if (!agent->has_exponent) return;
   least_bits = (least_bits < 33 ? least_bits : 33) - SDNN_HORIZON_BITS - 10;
   for (j = 0; j < SDNN_N_WEIGHTS + SDNN_N_AVERAGED; ++j) {
-    used |= (uint32_t)(agent->weights[j] ^ agent->weights[j] >> 31);
+    used |= (uint32_t)(agent->weights[j] ^ -(agent->weights[j] < 0));
   }
   spare_bits -= sdnn_log2(used) + 1;
   if (n_free > spare_bits) n_free = spare_bits;
@@ -153,7 +153,7 @@ static inline uint32_t sdnn_move_row(sdnn_agent* agent, uint32_t row, const sdnn
   uint32_t j;
   for (j = 0; j < SDNN_N_COLUMNS; ++j) {
     const int32_t product = traces[j] * SDNN_TRACE_DECAY;
-    traces[j] = (product + (int32_t)((uint32_t)(product >> 31) >> 19)) >> 13; /* product / 8192 */
+    traces[j] = (product + (int32_t)((uint32_t)-(product < 0) >> 19)) >> 13; /* product / 8192 */
   }
   if (code) {
     const uint32_t n = code->n_negative;
@@ -164,7 +164,7 @@ static inline uint32_t sdnn_move_row(sdnn_agent* agent, uint32_t row, const sdnn
   for (j = 0; j < SDNN_N_COLUMNS; ++j) {
     const int32_t trace = traces[j], weight = weights[j] + ((step * trace + half) >> shift);
     weights[j] = weight;
-    used |= weight ^ weight >> 31;
+    used |= weight ^ -(weight < 0);
     live |= trace;
   }
   agent->is_live[row] = live != 0;

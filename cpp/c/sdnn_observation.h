@@ -48,8 +48,12 @@ static inline uint32_t sdnn_bit(const uint8_t* bits, uint32_t k) {
 
 /* Whether a group and the next one are stored as half their sum and half their difference. */
 static inline uint32_t sdnn_is_double(uint32_t group) {
-  const uint32_t n = SDNN_N_DOUBLE_GROUPS;
-  return n == SDNN_N_GROUPS || group < n;
+#if SDNN_N_DOUBLE_GROUPS > 0 && SDNN_N_DOUBLE_GROUPS < SDNN_N_GROUPS
+  return group < SDNN_N_DOUBLE_GROUPS;
+#else
+  (void)group;
+  return SDNN_N_DOUBLE_GROUPS > 0;
+#endif
 }
 
 /* Computes the selectively desensitized code: for each pair of inputs the pattern of one, neutral
@@ -59,7 +63,7 @@ static inline void sdnn_encode(const sdnn_coding* coding, const uint32_t* bins, 
   const uint8_t* patterns[SDNN_N_INPUTS];
   const uint8_t* first = coding->patterns;
   const sdnn_unit* unit = coding->units;
-  sdnn_column *positive = code->columns, *negative = code->columns + SDNN_MOST_COLUMNS;
+  sdnn_column *positive = &code->columns[0], *negative = positive + SDNN_MOST_COLUMNS;
   uint32_t i, group, byte;
   for (i = 0; i < SDNN_N_INPUTS; ++i) {
     const uint32_t last = sdnn_n_bins[i] - 1;

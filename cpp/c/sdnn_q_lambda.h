@@ -110,6 +110,7 @@ static inline uint32_t sdnn_move_rows(sdnn_agent* agent, const sdnn_code* code,
   return used;
 }
 
+#if SDNN_AVERAGES
 /* Moves the average to the weights by 1 / 2^k of the way, with growing k. */
 static inline void sdnn_note_step(sdnn_agent* agent) {
   const uint32_t interval = SDNN_AVERAGING_INTERVAL;
@@ -126,6 +127,7 @@ static inline void sdnn_note_step(sdnn_agent* agent) {
   }
   if (agent->n_snapshots < SDNN_MOST_SNAPSHOTS) ++agent->n_snapshots;
 }
+#endif
 
 /* Takes a step of learning from the pending transition; `next` is the value of the next state. */
 static inline void sdnn_correct(sdnn_agent* agent, int64_t next) {
@@ -133,7 +135,9 @@ static inline void sdnn_correct(sdnn_agent* agent, int64_t next) {
   int64_t drift;
   const int64_t error = sdnn_error(agent, code, agent->action, agent->reward, next, &drift);
   sdnn_move(agent, code, agent->action, error + drift, drift);
-  if (SDNN_AVERAGES) sdnn_note_step(agent);
+#if SDNN_AVERAGES
+  sdnn_note_step(agent);
+#endif
 }
 
 static inline void sdnn_correct_by_best(sdnn_agent* agent) {
@@ -165,6 +169,8 @@ static inline int sdnn_lacks_rewards(const sdnn_agent* agent) {
   return SDNN_SEARCHES && agent->n_learned > 0 && !agent->has_exponent && agent->epsilon > 0;
 }
 
+static inline uint32_t sdnn_larger(uint32_t a, uint32_t b) { return a > b ? a : b; }
+
 /* Whether the next action is a random one, which is in agent->kept then. */
 static inline int sdnn_explores(sdnn_agent* agent) {
   const uint32_t step = agent->step++;
@@ -191,7 +197,7 @@ static inline int sdnn_explores(sdnn_agent* agent) {
     const uint32_t most = (uint32_t)SDNN_MAX_ACTION_REPEAT >> agent->n_ended;
     const uint32_t least = SDNN_MAX_ACTION_REPEAT < 5 ? SDNN_MAX_ACTION_REPEAT : 5;
     agent->n_kept =
-        sdnn_repetitions(&agent->randoms[SDNN_REPETITIONS], most > least ? most : least) - 1;
+        sdnn_repetitions(&agent->randoms[SDNN_REPETITIONS], sdnn_larger(most, least)) - 1;
   }
   return 1;
 }
@@ -207,7 +213,7 @@ static inline int64_t sdnn_tie_tolerance(int32_t exponent) {
 static inline void sdnn_act_in_each(sdnn_agent* agent, const int32_t* observation,
                                     uint32_t* action) {
   uint32_t bins[SDNN_N_INPUTS], d;
-  int64_t sums[SDNN_MOST_ROWS], least;
+  int64_t sums[SDNN_MOST_ROWS];
   const sdnn_code* code;
   if (SDNN_IS_REFUSED(int32_t, observation)) {
     sdnn_refuse(action);
@@ -225,7 +231,8 @@ static inline void sdnn_act_in_each(sdnn_agent* agent, const int32_t* observatio
   code = sdnn_other(agent, bins);
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
     sdnn_sums(agent->weights, code, d, sums);
-    least = sdnn_largest(sums, sdnn_n_actions[d]) - sdnn_tie_tolerance(agent->exponent);
+    const int64_t least =
+        sdnn_largest(sums, sdnn_n_actions[d]) - sdnn_tie_tolerance(agent->exponent);
     action[d] = sdnn_draw_tied(sums, sdnn_n_actions[d], least, &agent->randoms[SDNN_ACTING]);
   }
   sdnn_note_act(&agent->states, action);

@@ -14,7 +14,7 @@ static inline uint32_t sdnn_tied(const sdnn_score* scores, uint32_t n_actions, s
   uint32_t action = 0;
 #if SDNN_TIES == SDNN_LOWEST
   (void)n_actions;
-  while (scores[action] < least) ++action;
+  while (scores[action] < least) ++action; /* cppcheck-suppress uninitvar */
 #else
   uint32_t i, run = 0, widest = 0;
   for (i = 0; i < n_actions; ++i) {

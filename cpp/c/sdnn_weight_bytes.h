@@ -11,7 +11,7 @@
 static inline void sdnn_add_columns(const uint32_t* weights, const sdnn_column* column, uint32_t n,
                                     uint32_t sign, uint32_t* sums) {
   while (n > 0) {
-    uint32_t left = n < 256 ? n : 256, even = 0, odd = 0, word;
+    uint32_t left = n < 256 ? n : 256, even = 0, odd = 0;
     n -= left;
     for (; left >= 4; left -= 4, column += 4) {
       const uint32_t first = weights[column[0]], second = weights[column[1]];
@@ -26,7 +26,7 @@ static inline void sdnn_add_columns(const uint32_t* weights, const sdnn_column* 
       odd += fourth >> 8;
     }
     for (; left > 0; --left) {
-      word = weights[*column++];
+      const uint32_t word = weights[*column++];
       even += word & UINT32_C(0xff00ff);
       odd += word >> 8;
     }

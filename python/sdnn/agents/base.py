@@ -79,7 +79,6 @@ class BaseAgent(Advised, abc.ABC, Generic[Approximator, Learning]):
     _scaling: Scaling | None = None
     _next_episode = 0  # number of the next episode of `train` without a seed
     _has_warned = False
-    _has_masks = False  # whether it has learned or explored with action masks
     has_bounds = True
     """Whether the spaces have an environment's bounds; False for agents made in C++ from ranges."""
 
@@ -273,7 +272,7 @@ class BaseAgent(Advised, abc.ABC, Generic[Approximator, Learning]):
         explore = flag("explore", explore)
         self._check_environment(environment)
         variables = self._observations.vector("observation", observation)
-        allowed = self._mask("mask", mask) if explore else self._actions.mask("mask", mask)
+        allowed = self._actions.mask("mask", mask, is_learned=explore)
         numbers = self._controller.act(variables, explore, environment, allowed)
         return self._actions.elements(numbers)[0]
 
@@ -332,15 +331,9 @@ class BaseAgent(Advised, abc.ABC, Generic[Approximator, Learning]):
             self._observations.vector("next_observation", next_observation),
             flag("terminated", terminated),
             environment,
-            self._mask("next_mask", next_mask),
+            self._actions.mask("next_mask", next_mask),
             duration_of(dt),
         )
-
-    def _mask(self, name: str, mask: Mask) -> NDArray[np.uint8] | None:
-        """Return the core's mask of actions for learning, and note that there is one."""
-        row = self._actions.mask(name, mask)
-        self._has_masks |= row is not None
-        return row
 
     def warn_of_problems(self) -> None:
         """Warn once of a reward that was too large to be learned, and of an impossible history."""
@@ -370,7 +363,7 @@ class BaseAgent(Advised, abc.ABC, Generic[Approximator, Learning]):
         actions = self._actions
         if functions != [BaseAgent.act, BaseAgent.learn]:
             return None
-        return CoreParts(self._controller, self._observations.rows, actions.elements, self._mask)
+        return CoreParts(self._controller, self._observations.rows, actions.elements, actions.mask)
 
     @property
     def scaling(self) -> Scaling | None:
@@ -398,8 +391,7 @@ class BaseAgent(Advised, abc.ABC, Generic[Approximator, Learning]):
             more["wrappers"] = msgspec.to_builtins(self.wrappers)
         if self._next_episode:
             more["next_episode"] = self._next_episode
-        if self._has_masks:
-            more["action_masks"] = True
+        more |= {"action_masks": True} if self._actions.has_masks else {}
         if self.has_bounds:
             more["observation_space"] = space_data(self.observation_space)
             more["action_space"] = space_data(self.action_space)

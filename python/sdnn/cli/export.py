@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     import gymnasium as gym
 
     from sdnn.agents.agent import AnyAgent
+    from sdnn.environments.spaces import Missing
     from sdnn.environments.types import Data
     from sdnn.estimators.fitted import Fitted
     from sdnn.export import CHeader, EstimatorHeader
@@ -90,6 +91,12 @@ _LARGEST = 2**31  # limit of the ranges of observations and actions
     metavar="BYTES",
     type=click.IntRange(1, 2**31),
     help="With --new: most memory that the agent may take.  [default: 20000, or 60000 for sdnn-c]",
+)
+@click.option(
+    "--missing",
+    type=click.Choice(["error", "hold", "code"]),
+    help="With --new: whether missing readings are refused, count as the last ones of the episode,"
+    " or have a pattern.  [default: error]",
 )
 @click.option(
     "--set",
@@ -290,6 +297,7 @@ def _new_agent(
     ram: int | None,
     settings: Sequence[str],
     seed: int | None,
+    missing: Missing | None,
 ) -> AnyAgent:
     import gymnasium as gym
     import numpy as np
@@ -318,6 +326,7 @@ def _new_agent(
             kind=kind,
             ram_bytes=ram,
             seed=seed or 0,
+            missing=missing or "error",
             angles=[i for i, text in enumerate(ranges) if text == "angle"],
             **parts,
         )

@@ -249,10 +249,13 @@ class Actions:
         Of each dimension that is not a Box's.
     config : ActionConfig
         The core's settings.
+    has_masks : bool
+        Whether there was a mask, except of greedy actions.
     """
 
     def __init__(self, space: Space) -> None:
         self.space = space
+        self.has_masks = False
         self.is_box = isinstance(space, gym.spaces.Box)
         wholes = wholes_of(space)
         self.n_actions = [last - first + 1 for first, last in wholes or ()]
@@ -296,7 +299,7 @@ class Actions:
         are_within = (self.config.low <= values) & (values <= self.config.high)
         return len(rows) == 0 or (is_alike and bool(are_within.all()))
 
-    def mask(self, name: str, mask: Any) -> NDArray[np.uint8] | None:
+    def mask(self, name: str, mask: Any, is_learned: bool = True) -> NDArray[np.uint8] | None:
         """Convert a mask to a flat array, with 1 for allowed actions; ValueError if it is none.
 
         One array of all actions, or one for each dimension; None: all actions are allowed.
@@ -314,6 +317,7 @@ class Actions:
         require([part.size for part in parts] == sizes, name, expected, mask)
         allowed = np.concatenate(parts)
         require(((allowed == 0) | (allowed == 1)).all(), name, "be 0 or 1 per action", mask)
+        self.has_masks |= is_learned
         return allowed.astype(np.uint8)
 
     def numbers(self, action: Element) -> Array:

@@ -8,6 +8,7 @@ from typing import Any
 
 from sdnn.agents import SDNNActorCritic, SDNNQLambda, SDNNQLearning
 from sdnn.agents.agent import AnyAgent
+from sdnn.agents.base import BaseAgent
 from sdnn.export.actor_critic import ActorCriticLearner, ActorCriticWriter
 from sdnn.export.q_lambda import QLambdaLearner, QLambdaWriter
 from sdnn.export.sdnn_c import SDNNCLearner, SDNNCWriter
@@ -101,11 +102,6 @@ def writer_of(agent: Any, name: str, fraction_bits: int | None, *, learns: bool)
     TypeError for agents without a header. ValueError for an agent that has learned with action
     masks, for SDNN-C with a history, and for running ranges in an agent that would learn.
     """
-    expected = (
-        "have learned without action masks, which no C header has: it would take actions that are"
-        " not allowed. Train without masks, with a reward that punishes such actions"
-    )
-    require(not getattr(agent, "_has_masks", False), "agent", expected, agent)
     has_history = getattr(agent, "history", "none") not in ("none", "auto")
     expected = "have history='none', as SDNNQLambda and SDNNActorCritic alone have a history in C"
     is_possible = not has_history or isinstance(agent, SDNNQLambda | SDNNActorCritic)
@@ -115,6 +111,13 @@ def writer_of(agent: Any, name: str, fraction_bits: int | None, *, learns: bool)
         " observation_range=(low, high), or sdnn train --range LOW:HIGH"
     )
     require(not (learns and _follows_ranges(agent)), "agent", expected, agent)
+    expected = (
+        "have learned without action masks, which no C header has: it would take actions that are"
+        " not allowed. Train without masks, with a reward that punishes such actions"
+    )
+    require(
+        not isinstance(agent, BaseAgent) or not agent._actions.has_masks, "agent", expected, agent
+    )
     if isinstance(agent, SDNNQLearning):
         return (SDNNCLearner if learns else SDNNCWriter)(agent, name, fraction_bits)
     if isinstance(agent, SDNNQLambda):

@@ -173,7 +173,7 @@ class Tables:
         self.n_bytes += _BYTES[kind] * values.size
         if comment:
             self.lines.append(f"/* {comment} */")
-        form = {"uint64_t": "UINT64_C({})"}.get(kind, "{}")
+        form = {"uint64_t": "0x{:x}u"}.get(kind, "{}")
         if kind == "uint32_t" and "weights" in name:
             form = "0x{:x}"
         stored = values if values.size else np.zeros(1, np.int64)  # C has no empty arrays

@@ -246,8 +246,8 @@ class Writer(ABC, Generic[Network]):
         if self.history.holds:
             return [f"A reading may be {name}_MISSING: it counts as the last one of the episode."]
         return [
-            f"With {name}_REFUSES defined before the include, an observation in which a reading is",
-            f"{name}_MISSING gives the action {name}_REFUSED, and nothing is learned of it.",
+            f"With {name}_REFUSES defined before the include, an observation in which a reading",
+            f"is {name}_MISSING gives the action {name}_REFUSED, and nothing is learned of it.",
         ]
 
     def _usage(self) -> list[str]:

@@ -42,6 +42,7 @@ from sdnn.agents import (
     SDNNQLambda,
     SDNNQLearning,
     Transition,
+    load_agent,
 )
 from sdnn.export import c_header, export_c_header
 from sdnn.export.text import weight_words
@@ -330,6 +331,7 @@ def test_an_export_writes_the_header_and_a_failed_one_nothing(tmp_path):
     assert (tmp_path / "one.h").read_text() == header.text
     assert header.name == "one"
     refuses("name", export_c_header, agent, tmp_path / "not one.h")
+    refuses("path", export_c_header, agent, tmp_path)
     refuses("nowhere", export_c_header, agent, tmp_path / "nowhere" / "one.h", error=OSError)
     assert [path.name for path in tmp_path.iterdir()] == ["one.h"]
 
@@ -347,3 +349,19 @@ def test_agents_of_other_types_sizes_or_unknown_ranges_are_refused():
         SDNNQLearning(box(1.0, 1.0), Discrete(2), approximator=large),
         "policy",
     )
+
+
+def test_an_agent_that_has_learned_with_action_masks_is_refused(tmp_path):
+    def untrained():
+        return SDNNQLambda(Discrete(3), Discrete(2))
+
+    acted, learned_next, greedy = untrained(), untrained(), untrained()
+    acted.act(1, mask=[1, 0])
+    learned_next.learn(Transition(0, 1, 1.0, 2, terminated=False, next_mask=[1, 0]))
+    greedy.act(1, explore=False, mask=[1, 0])
+    for agent in (acted, learned_next):
+        agent.save(tmp_path / "masked.safetensors")
+        for masked in (agent, load_agent(tmp_path / "masked.safetensors")):
+            refuses("agent", c_header, masked, "policy")
+            refuses("agent", c_header, masked, "policy", learning=True)
+    c_header(greedy, "policy")

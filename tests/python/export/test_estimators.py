@@ -277,6 +277,10 @@ def test_few_weights_beyond_a_byte_take_little_flash():
     assert header.weight_bytes == 4 * n_words + (1 + len(model._earlier)) * (48 + 3) + structs
 
 
+def test_a_folder_is_no_path_of_a_header(tmp_path):
+    refuses("path", export_estimator_header, fitted("one-pair")[0], tmp_path)
+
+
 def test_estimators_without_a_form_in_c_are_refused_with_a_remedy():
     X, y = numbers(40, 1), np.arange(40.0)
     refuses("name", estimator_header, fitted("one-pair")[0], "int a")
