@@ -51,8 +51,8 @@ def c_header(
     one of several best actions, it takes the middle of their widest run. With a history of
     observations the policy has a struct with the memory of an episode. An agent that learns does
     and remembers in C what it would in Python in one environment, to the bit, as long as
-    observations and rewards are multiples of ``2**-fraction_bits``. See
-    docs/how-to/small-processors.md.
+    observations and rewards are multiples of ``2**-fraction_bits``. ``NAME_MISSING`` is a missing
+    reading, which is treated as by the agent. See docs/how-to/small-processors.md.
 
     Parameters
     ----------
