@@ -10,6 +10,7 @@
  */
 #define WITHOUT_MAIN
 #define KEEP_EPISODES 10
+#include "stack.h"
 #include "wheel.c"
 
 #define PAGE 1024
@@ -97,26 +98,6 @@ static int write_kept(void* context, uint32_t offset, const uint8_t* bytes, uint
   if (offset == 0) erase_flash(context, 2 * SLOT, POLE_KEPT_BYTES);
   return write_flash(context, 2 * SLOT + offset, bytes, n);
 }
-
-#ifdef __x86_64__
-static void paint_stack(void) {}
-static uint32_t stack_used(void) { return 0; }
-#else
-extern uint8_t __heap_start[], __stack[];
-#define PAINT 0xA5
-
-static void paint_stack(void) {
-  volatile uint8_t* byte = __heap_start;
-  const uint8_t* const here = __builtin_frame_address(0);
-  while (byte < here - 64) *byte++ = PAINT;
-}
-
-static uint32_t stack_used(void) {
-  const volatile uint8_t* byte = __heap_start;
-  while (byte < __stack && *byte == PAINT) ++byte;
-  return (uint32_t)(__stack - (const uint8_t*)byte);
-}
-#endif
 
 /* Learns, and keeps the best policy each 2,000 steps. */
 static void learn(uint32_t n_steps) {

@@ -105,7 +105,7 @@ def live(command, flash, lives, *, is_micro_bit=False):
 
 @pytest.mark.parametrize("name", ["cortex-m0", *MEDIUM])
 def test_an_agent_learns_keeps_and_saves_on_a_board_that_loses_its_power(name, needs, tmp_path):
-    """Flash outlives each process and its states become those of a life without a loss."""
+    """The flash outlives each process, and becomes that of a life without a loss."""
     target, is_micro_bit = BOARDS[name].target(), name == "cortex-m0"
     needs(target.compiler, target.runner, options=target.options)
     board = lives_of(target, tmp_path / "board", *(["-DNRF51"] if is_micro_bit else []))

@@ -177,6 +177,14 @@ def test_caches_of_data_are_read_in_bytes(tmp_path, yardsticks):
     assert yardsticks.caches(tmp_path) == {"L1d": 32 * 2**10, "L3": 8 * 2**20}
 
 
+def test_the_page_of_small_processors_shows_the_stored_measurements():
+    module = script("arm/baselines")
+    text = module.PAGE.read_text()
+    assert sys.modules["page"].with_tables(text, module.page_tables()) == text, (
+        "docs/evidence/boards.md is not what is stored: run bench/arm/baselines.py --redraw"
+    )
+
+
 def test_the_performance_page_shows_the_stored_run():
     module = script("performance_tables")
     text = module.PAGE.read_text()

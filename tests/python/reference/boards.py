@@ -1,4 +1,4 @@
-"""Boards that an emulator runs whole: their processor, memory map, and flash controller.
+"""Boards that an emulator runs whole: their processor and memory map.
 
 Programs link as firmware does, at the chip's addresses and within its flash and RAM, of which 2 kB
 are the stack. They read and write by semihosting, as under a debugger. No board was used.
@@ -22,15 +22,15 @@ class Board:
     ram: int
     ram_bytes: int
 
-    def target(self):
-        """Return the compiler and the emulator."""
+    def target(self, floats=("-mfloat-abi=soft",)):
+        """Return the compiler, on Arm with options for floating point, and the emulator."""
         is_arm = self.processor.startswith("-mcpu")
         memory = {
             "__flash": self.flash, "__flash_size": self.flash_bytes,
             "__ram": self.ram, "__ram_size": self.ram_bytes, "__stack_size": 2 * K,
         }  # fmt: skip
         options = (
-            self.processor, *(("-mthumb", "-mfloat-abi=soft") if is_arm else _RISCV),
+            self.processor, *(("-mthumb", *floats) if is_arm else _RISCV),
             "--specs=picolibc.specs", "--oslib=semihost", "--crt0=hosted", "-ffreestanding",
             "-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections",
             *(f"-Wl,--defsym={name}={value:#x}" for name, value in memory.items()),
@@ -70,6 +70,7 @@ BOARDS = {
 }
 
 STDIO = """
+#pragma once
 #include <stddef.h>
 #include <stdint.h>
 #define stdin 0
