@@ -101,6 +101,9 @@ TEST(Power, IsExactForBasesZeroAndOne) {
     EXPECT_EQ(sdnn::core::power(0.0, exponent), 0.0);
     EXPECT_EQ(sdnn::core::power(1.0, exponent), 1.0);
   }
+}
+
+TEST(Power, HasTheValuesOfPowersOfTwo) {
   EXPECT_DOUBLE_EQ(sdnn::core::power(0.5, 3.0), 0.125);
   EXPECT_DOUBLE_EQ(sdnn::core::power(16.0, 0.25), 2.0);
 }

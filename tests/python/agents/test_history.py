@@ -106,7 +106,10 @@ def test_the_history_by_default_is_auto_in_the_general_presets_alone():
 
 @pytest.mark.parametrize("settings", [{}, {"inputs": "all"}])
 def test_an_agent_that_finds_no_history_learns_the_bits_of_one_without(settings):
-    """Inputs that matter later are still found, too."""
+    """After a vain search for a history, an agent looks for inputs that matter later, as others do.
+
+    Six further inputs are noise.
+    """
 
     def task():
         env, random = exact(), np.random.default_rng(1)

@@ -9,10 +9,11 @@
 
 namespace sdnn::agents {
 
-/// Remembers the last n_steps transitions before each of the times 2, 4, 8, ... times n_steps.
+/// Remembers the last n transitions before transition number 2 n, 4 n, 8 n and so on; n = n_steps.
 class LatestTransitions {
  public:
-  /// `empty` remembers n_steps transitions, which are the first ones of all.
+  /// `empty` has room for n_steps transitions. The first n_steps of all count as seen: the agent
+  /// was warming up.
   LatestTransitions(WarmUp empty, std::size_t n_steps)
       : empty_(std::move(empty)), latest_(empty_), n_steps_(n_steps), n_seen_(n_steps) {}
 
@@ -22,7 +23,7 @@ class LatestTransitions {
   }
   void begin_episode(std::size_t environment) { latest_.begin_episode(environment); }
 
-  /// Counts a transition, and remembers it if it is one of the last n_steps before such a time.
+  /// Counts a transition, and remembers it if its number is one of those that are looked at.
   /// Returns whether all n_steps are remembered: then look at them, and call `forget`.
   bool learn(const WarmUp::Step& step) {
     const bool is_noted = n_seen_ >= next_time() - n_steps_;

@@ -53,7 +53,7 @@ class LastStates {
       : history_(history, experience, observations.n_symbols(), experience.actions.size()) {}
 
   const HistoryFilter& history() const noexcept { return history_; }
-  /// Forgets all episodes, of a task whose ranges are known.
+  /// Forgets all episodes, and takes the sizes of the task, once the ranges are known.
   void restart(const Observations& observations, std::size_t n_dimensions) {
     n_variables_ = observations.n_variables();
     n_dimensions_ = n_dimensions;
