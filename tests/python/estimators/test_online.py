@@ -324,8 +324,8 @@ def river_models(river, **options):
 
 
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
-@pytest.mark.parametrize("n_before", [0, 19, 40])
-@pytest.mark.parametrize("number", [0, 1])
+@pytest.mark.parametrize("n_before", [0, 19, 40])  # the grace period ends with 20 samples
+@pytest.mark.parametrize("number", [0, 1], ids=["regressor", "classifier"])
 def test_river_estimators_refuse_a_bad_sample_and_keep_learning(river, number, n_before):
     model, without_refusals = (river_models(river, grace_period=20)[number] for _ in range(2))
     targets = [Y.tolist(), LABELS.tolist()][number]

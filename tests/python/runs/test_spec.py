@@ -184,7 +184,7 @@ def test_with_own_units_angle_pairs_can_be_declared_despite_noise():
 
 
 @pytest.mark.parametrize("inputs", ["relevant", (1, 3)])
-def test_the_setting_inputs_reaches_the_agent_and_the_hash(inputs):
+def test_the_setting_inputs_reaches_agent_and_hash_and_unknown_inputs_are_refused(inputs):
     spec = RunSpec(
         environment=CART_POLE, agent=AgentSpec(name="sdnn-c", inputs=inputs, warm_up_steps=50)
     )
@@ -192,12 +192,10 @@ def test_the_setting_inputs_reaches_the_agent_and_the_hash(inputs):
     env = spec.make_env()
     agent = spec.make_agent(env)
     assert agent.is_warming_up  # it looks for relevant inputs
-    plain = spec.replace(agent=spec.agent.replace(inputs="all"))
-    assert plain.config_hash != spec.config_hash
-    assert (
-        plain.replace(agent=AgentSpec(name="sdnn-c", warm_up_steps=50)).config_hash
-        == plain.config_hash
-    )
+    with_all = spec.replace(agent=spec.agent.replace(inputs="all"))
+    assert with_all.config_hash != spec.config_hash
+    by_default = spec.replace(agent=AgentSpec(name="sdnn-c", warm_up_steps=50))
+    assert by_default.config_hash == with_all.config_hash
     unknown = spec.replace(agent=spec.agent.replace(inputs=(4,)))
     with pytest.raises(ConfigError) as caught:
         unknown.make_agent(env)
