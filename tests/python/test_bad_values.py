@@ -42,7 +42,7 @@ def test_every_constructor_parameter_has_cells_of_the_matrix():
         assert sum(f"({parameter}=" in name for name in cells) >= len(bad_inputs.BAD)
 
 
-def test_every_command_has_a_row_of_the_matrix():
+def test_every_command_has_bad_options_that_are_tested():
     assert set(main.commands) == set(bad_options.COMMANDS) | bad_options.LEFT_OUT
 
 

@@ -156,7 +156,7 @@ TEST(EpsilonGreedy, EqualSeedsGiveEqualActionsAndOtherSeedsDifferentOnes) {
     EXPECT_EQ(action, same.select(tied, i, true));
     differ += action != other_seed.select(tied, i, true);
   }
-  EXPECT_GT(differ, 90);
+  EXPECT_GT(differ, 90);  // equal ones of 601 are rare
 }
 
 // Eigen's maximum of a row with NaN is NaN or a number: the row is refused, or the number selected.

@@ -28,7 +28,7 @@ TEST(PredictionMixture, WeightsAreTheInverseEighthPowerOfErrorsMixedWithTheirMea
   EXPECT_NEAR(mixture.mix(Numbers{1.0, 4.0}), (ratio + 4.0) / (ratio + 1.0), 1e-14);
 }
 
-TEST(PredictionMixture, StartsWithThePriors) {
+TEST(PredictionMixture, StartsWithThePriorsAndEqualErrorsKeepThem) {
   PredictionMixture mixture(Numbers{3.0, 1.0});
   EXPECT_EQ(mixture.weights(), (Numbers{0.75, 0.25}));
   mixture.learn(Numbers{0.0, 0.0}, 1.0);

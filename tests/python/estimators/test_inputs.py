@@ -48,6 +48,9 @@ def test_columns_that_do_not_exist_are_refused():
 def test_columns_that_are_not_listed_have_the_default_coding():
     codings = codings_of_columns([("anchor", [1])], None, 3)
     assert [coding.name for coding in codings] == ["random-inverse", "anchor", "random-inverse"]
+
+
+def test_a_coding_without_columns_in_a_list_is_refused():
     refuses("coding", codings_of_columns, [("anchor",)], None, 3)
 
 

@@ -85,20 +85,28 @@ def test_epochs_of_fit_equal_passes_of_partial_fit():
     same(SDNNRegressor(**REGRESSOR, max_iter=5, shuffle=False).fit(X, Y), online)
 
 
-@pytest.mark.parametrize(
+both_estimators = pytest.mark.parametrize(
     ("estimator", "options", "targets"),
     [(SDNNRegressor, REGRESSOR, Y), (SDNNClassifier, {**SETTINGS, "n_units_per_class": 8}, LABELS)],
 )
+
+
+@both_estimators
 def test_a_warm_start_of_3_after_2_epochs_equals_5_epochs(estimator, options, targets):
     model = estimator(**options, shuffle=False, warm_start=True, max_iter=2).fit(X, targets)
     first, weights = model.network_, model.weights_
     assert model.set_params(max_iter=3).fit(X, targets).n_iter_ == 3
     same(model, estimator(**options, shuffle=False, max_iter=5).fit(X, targets))
     np.testing.assert_array_equal(first.layer.weights, weights)
+
+
+@both_estimators
+def test_a_warm_start_that_is_refused_keeps_the_weights(estimator, options, targets):
+    model = estimator(**options, warm_start=True, max_iter=2).fit(X, targets)
+    before = model.weights_
     model.set_params(max_iter=1, training="dual", memory_limit=100)
-    now = model.weights_
     refuses("memory_limit", model.fit, X, targets)
-    np.testing.assert_array_equal(model.weights_, now)
+    np.testing.assert_array_equal(model.weights_, before)
 
 
 def test_a_warm_start_refuses_other_features_outputs_and_classes():

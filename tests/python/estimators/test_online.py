@@ -457,7 +457,7 @@ def test_river_classifiers_refuse_nan_labels_and_new_classes_of_one_vs_one(river
 
 
 @pytest.mark.parametrize("n_classes", [2, 3])
-def test_predict_proba_one_has_the_bits_of_predict_proba(n_classes):
+def test_predict_proba_one_has_the_bits_of_predict_proba_and_needs_several_units(n_classes):
     model = classifier().fit(X, np.minimum(LABELS, n_classes - 1))
     each = [model.predict_proba_one(row) for row in X[:50]]
     np.testing.assert_array_equal(each, model.predict_proba(X[:50]))
