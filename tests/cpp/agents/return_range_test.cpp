@@ -161,6 +161,7 @@ TEST(ReturnRange, StaysFiniteWithHugeRewards) {
 }
 
 TEST(ReturnRange, RefusesInconsistentStates) {
+  constexpr std::size_t kFewest = 32, kMost = 256;  // returns that are remembered after 1,000
   Stream environment(0.5);
   for (int i = 0; i < 1000; ++i) environment.note(8.0, i % 2 == 0);
   ReturnRange& range = environment.range;
@@ -176,13 +177,13 @@ TEST(ReturnRange, RefusesInconsistentStates) {
   }
   refused(testing::with_number(good, "low", 1.0), "low");
   refused(testing::with_number(good, "high", -1.0), "high");
-  refused(testing::with_number(good, "oldest", std::uint64_t{256}), "oldest");
+  refused(testing::with_number(good, "oldest", std::uint64_t{kMost}), "oldest");
   refused(testing::with_number(good, "due", std::uint64_t{1} << 40), "due");
   core::State bad = good;
-  bad["returns"] = testing::tensor_of(std::vector<double>(257, 0.0));
+  bad["returns"] = testing::tensor_of(std::vector<double>(kMost + 1, 0.0));
   refused(bad, "returns");
-  bad["returns"] = testing::tensor_of(std::vector<double>(31, 0.0));
-  refused(bad, "oldest");
+  bad["returns"] = testing::tensor_of(std::vector<double>(kFewest - 1, 0.0));
+  refused(bad, "oldest");  // that of a full list
   bad["oldest"] = core::state_of(ReturnRange(0.5)).at("oldest");
   refused(bad, "returns");
 }

@@ -106,7 +106,7 @@ TEST(OnlineLayer, AStoppedPresentationChangesNothing) {
 TEST(OnlineLayer, AnOverflowOfAWeightChangesNothing) {
   Problem problem = testing::random_problem(1);
   const std::size_t n_columns = problem.code->n_columns();
-  constexpr std::int32_t kLargest = (1 << 14) - 1;
+  constexpr std::int32_t kLargest = (1 << 14) - 1;  // in two bytes; a correction may exceed it
   const std::vector<std::int32_t> weights(problem.n_units * n_columns, kLargest);
   const std::vector<std::int32_t> thresholds(problem.n_units, 0);
   const auto layer = std::make_shared<estimators::ParallelPerceptron>(problem.code, problem.n_units,

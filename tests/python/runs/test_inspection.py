@@ -118,12 +118,12 @@ def test_the_table_and_the_warnings_are_printed(invoke, trained):
         assert warning.split(":")[0] in page
 
 
-def test_the_map_is_over_the_inputs_that_are_named(invoke, trained):
-    folder = trained("CartPole-v1")
-    options = ("--input", "observation 3", "--input", 0, "--json", "--seed", 4)
+def test_the_map_is_over_the_named_inputs_and_the_episode_follows_from_the_seed(invoke, trained):
+    folder, seed = trained("CartPole-v1"), 4
+    options = ("--input", "observation 3", "--input", 0, "--json", "--seed", seed)
     values = json.loads(invoke("inspect", folder, *options).stdout)
     assert values["map_of"] == ["observation 3", "observation 0"]
-    returns = Run.open(folder).evaluate(1, 4).returns
+    returns = Run.open(folder).evaluate(1, seed).returns
     assert values["episode"]["return"] == returns[0]
     assert values == json.loads(invoke("inspect", folder, *options).stdout)
 
