@@ -21,7 +21,7 @@ import tempfile
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from multiprocessing.connection import wait
 from pathlib import Path
@@ -178,6 +178,9 @@ class _Measurements:
     def keys(self) -> set[Key]:
         return {tuple(json.loads(key)) for key in self.store.measurements(self.kind)}
 
+    def together(self) -> AbstractContextManager[None]:
+        return self.store.together()
+
     def add(self, results: tuple[Key, dict[str, Any]], *, is_exact: bool) -> None:
         key, content = results
         self.store.put(self.kind, json.dumps(key), content)
@@ -198,8 +201,8 @@ class Here:
         for item in planned:
             if stop.is_set():
                 return
-            yield Advanced(item, 0)
-            yield _outcome(self.run_one, item, lambda done: None)
+            yield [Advanced(item, 0)]
+            yield [_outcome(self.run_one, item, lambda done: None)]
 
 
 @dataclass(frozen=True)
@@ -227,7 +230,7 @@ class Processes:
                     process.start()
                     sender.close()
                     running[receiver] = process, item
-                    yield Advanced(item, 0)
+                    yield [Advanced(item, 0)]
                 for receiver in wait(list(running), POLL_SECONDS):
                     process, item = running[receiver]
                     try:
@@ -237,7 +240,7 @@ class Processes:
                         kind, values = Failed, [RuntimeError(f"ended with {process.exitcode}")]
                     if kind is not Advanced:
                         del running[receiver]
-                    yield kind(item, *values)
+                    yield [kind(item, *values)]
         finally:
             for process, _ in running.values():
                 process.kill()
