@@ -4,18 +4,26 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "errors.hpp"
 #include "folders.hpp"
+#include "sdnn/agents/actions.hpp"
 #include "sdnn/agents/agent_file.hpp"
+#include "sdnn/agents/controller.hpp"
+#include "sdnn/agents/controller_config.hpp"
+#include "sdnn/agents/observation_config.hpp"
 #include "sdnn/agents/presets.hpp"
+#include "sdnn/agents/q_lambda_config.hpp"
 
 namespace sdnn::agents {
 namespace {

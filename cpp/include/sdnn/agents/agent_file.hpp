@@ -22,6 +22,7 @@
 #include "sdnn/agents/actor_critic_config.hpp"
 #include "sdnn/agents/any_agent.hpp"
 #include "sdnn/agents/controller.hpp"
+#include "sdnn/agents/controller_config.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/agents/q_lambda_config.hpp"
 #include "sdnn/agents/q_learning_config.hpp"
