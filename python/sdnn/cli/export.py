@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +23,6 @@ from sdnn.cli.common import (
     value_of,
     words_of_run,
 )
-from sdnn.runs.errors import ConfigError
 from sdnn.support.arguments import blamed
 
 if TYPE_CHECKING:
@@ -269,25 +268,12 @@ def _coarse_ranges(agent: AnyAgent, fraction_bits: int) -> Iterator[str]:
 
 def _read_agent_of(source: Path) -> AnyAgent:
     from sdnn.agents import load_agent
-    from sdnn.runs.config_file import ConfigFile
-    from sdnn.runs.run import CONFIG, agent_of
+    from sdnn.runs.run import agent_of
 
     try:
-        agent = agent_of(source) if source.is_dir() else load_agent(source)
+        return agent_of(source) if source.is_dir() else load_agent(source)
     except ValueError as error:
         raise click.ClickException(str(error)) from error
-    environment: object = None
-    if source.is_dir():
-        with suppress(ConfigError):  # a damaged file: the agent does not need it
-            # Reading it as a specification would import the modules that it names.
-            environment = ConfigFile.read(source / CONFIG).values.get("environment")
-    if isinstance(environment, dict) and environment.get("action_masks"):
-        raise click.ClickException(
-            f"{source} was trained with environment.action_masks, which no C header has: it would"
-            " take actions that are not allowed. Train without masks, with a reward that punishes"
-            " such actions"
-        )
-    return agent
 
 
 def _new_agent(
