@@ -88,11 +88,13 @@ def test_new_agents_without_memory_or_ranges_are_refused():
 
 def test_the_command_exports_the_same_linear_agent(export, tmp_path):
     settings = ("--set", "learning.discount=0.9", "--set", "approximator.n_actions=5")
+    settings += ("--missing", "hold")
     done = export("--new", *GIVEN, "--actions", "-1:1", "--ram", 9000, "--seed", 7, *settings)
     assert done.exit_code == 0, done.output
     preset = SDNNQLambda.presets["general"]
     agent = new_agent(
         SPACE, gym.spaces.Box(-1.0, 1.0, (1,), np.float64), ram_bytes=9000, seed=7, angles=[1],
+        missing="hold",
         approximator=replace(preset.approximator, n_actions=5),
         learning=replace(preset.learning, discount=0.9),
     )  # fmt: skip
