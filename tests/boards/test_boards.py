@@ -9,6 +9,7 @@ import pytest
 
 from boards import BOARDS
 from c_estimators import check_learning as check_learning_of_estimator, check_predictions
+from c_histories import POLICIES, check_policy
 from c_learners import LEARNERS, check_learning
 from c_policies import TARGETS, run
 from sdnn.approximators import LinearSDNNConfig
@@ -62,6 +63,12 @@ def test_agents_act_and_learn_with_the_same_bits(name, board, tmp_path):
 @pytest.mark.parametrize("name", ARE_LARGE)
 def test_large_agents_act_and_learn_with_the_same_bits(name, board, tmp_path):
     check_learning(name, board, tmp_path, 3000)
+
+
+@on(BOARDS)
+@pytest.mark.parametrize("name", POLICIES)
+def test_exported_policies_act_with_the_same_bits(name, board, tmp_path):
+    check_policy(name, "int32_t", board, tmp_path)
 
 
 @on(BOARDS)
