@@ -22,7 +22,7 @@ from sdnn._core import (
     SDNNCConfig as SDNNCConfig,
     SensorConfig as SensorConfig,
 )
-from sdnn.support.habits import explains_names
+from sdnn.support.arguments import explains_names
 
 
 class Field(NamedTuple):

@@ -21,8 +21,7 @@ from sdnn.estimators.inputs import CodedClassifier
 from sdnn.estimators.network import Network, Rule
 from sdnn.estimators.parameters import SHARE, documents, parameter, wholes, words
 from sdnn.estimators.training import class_weights, sample_weights, weighted_mean
-from sdnn.support.arguments import require, shown
-from sdnn.support.habits import explains_names
+from sdnn.support.arguments import explains_names, require, shown
 
 UNITS_EACH = 60
 MOST_UNITS = 1200

@@ -32,8 +32,7 @@ from sdnn.estimators.ridge import (
     solve_for,
 )
 from sdnn.estimators.training import Rows, class_weights, sample_weights
-from sdnn.support.arguments import flag, real
-from sdnn.support.habits import explains_names
+from sdnn.support.arguments import explains_names, flag, real
 
 AUTO = words("auto")
 DEGREES = (1, 2, 3)

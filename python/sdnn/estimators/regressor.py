@@ -18,8 +18,7 @@ from sdnn.estimators.network import Rule
 from sdnn.estimators.outliers import warn_caller
 from sdnn.estimators.parameters import documents, parameter, wholes, words
 from sdnn.estimators.training import weighted_mean
-from sdnn.support.arguments import array_of, require, shown
-from sdnn.support.habits import explains_names
+from sdnn.support.arguments import array_of, explains_names, require, shown
 
 MARGIN = 0.2  # share of the range of targets that is added on either side
 FURTHEST = 1e300  # largest limit of an output range, so that its width is finite

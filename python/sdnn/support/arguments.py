@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
 import os
 import reprlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from numbers import Integral, Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, SupportsFloat, TypeVar
 
+from sdnn.support.habits import advice
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 Member = TypeVar("Member")
+Called = TypeVar("Called", bound=Callable[..., Any])
 
 _REPR = reprlib.Repr()
 _REPR.maxstring = _REPR.maxother = _REPR.maxlong = 200
@@ -236,3 +241,68 @@ def has_methods(name: str, value: object, what: str, *methods: str) -> None:
     """Check that an argument has methods; TypeError that calls it ``what`` if not."""
     has_all = all(callable(getattr(value, method, None)) for method in methods)
     require(has_all and not isinstance(value, type), name, f"be {what}", value, TypeError)
+
+
+def explains_names(
+    elsewhere: Callable[[Any], Mapping[str, str]] = lambda _: {},
+) -> Callable[[Called], Called]:
+    """Make a decorator that adds hints to the errors of calls with unknown arguments.
+
+    ``elsewhere`` maps the first argument of a call to names in other places, as in `advice`.
+
+    >>> @explains_names()
+    ... def wait(seconds):
+    ...     pass
+    >>> wait(second=1)
+    Traceback (most recent call last):
+    TypeError: second is no argument of wait: did you mean seconds? possible: seconds
+    """
+
+    def decorate(called: Called) -> Called:
+        if isinstance(called, type):
+            called.__init__ = decorate(called.__init__)  # type: ignore[misc]
+            return called
+
+        @functools.wraps(called)
+        def call(*arguments: Any, **options: Any) -> object:
+            try:
+                return called(*arguments, **options)
+            except TypeError as error:
+                if error.__traceback__ is None or error.__traceback__.tb_next is not None:
+                    raise  # the function itself raised the TypeError
+                first = arguments[0] if arguments else None
+                problem = _error_of_call(called, arguments, options, elsewhere(first))
+                if problem is None:
+                    raise
+                raise problem from None
+
+        return call  # type: ignore[return-value]
+
+    return decorate
+
+
+def _error_of_call(
+    called: Callable[..., object], arguments: tuple[object, ...], options: Mapping[str, object],
+    elsewhere: Mapping[str, str],
+) -> Exception | None:  # fmt: skip
+    """Return the error that explains why arguments do not fit a function; None if they fit."""
+    is_made = called.__name__ == "__init__"
+    who = type(arguments[0]).__name__ if is_made else called.__name__
+    try:
+        signature = inspect.signature(called)
+    except ValueError:  # in the core, a class has the signature, not its `__init__`
+        signature = inspect.signature(type(arguments[0]))
+        arguments = arguments[1:]
+    parameters = signature.parameters.values()
+    names = [p.name for p in parameters if p.kind is not inspect.Parameter.VAR_KEYWORD]
+    possible = [name for name in names if name not in ("self", "cls")]
+    if len(names) == len(parameters):
+        for name in options:
+            if name not in names:
+                problem = f"is no argument of {who}: {advice(name, possible, elsewhere)}"
+                return argument_error(name, problem, TypeError)
+    try:
+        signature.bind(*arguments, **options)
+    except TypeError as error:
+        return TypeError(f"{who}: {error}; possible: {', '.join(possible)}")
+    return None

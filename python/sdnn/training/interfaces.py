@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from sdnn._core import Controller
 from sdnn.config import fields_of
 from sdnn.environments.types import Array, Data, Element, Elements, Mask, Masks
-from sdnn.support.habits import advice, explains_names
+from sdnn.support.arguments import explains_names
+from sdnn.support.habits import advice
 
 Seeds: TypeAlias = Mapping[int, int | None]
 Options: TypeAlias = Data | None
