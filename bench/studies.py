@@ -11,6 +11,7 @@ import argparse
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -123,6 +124,9 @@ class _Trials:
 
     def keys(self) -> set[TrialKey]:
         return self.store.keys()
+
+    def together(self) -> AbstractContextManager[None]:
+        return self.store.together()
 
     def add(self, results: tuple[TrialRecord, Any], *, is_exact: bool) -> None:
         record, curve = results

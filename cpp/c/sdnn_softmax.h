@@ -3,6 +3,7 @@
 #define SDNN_SOFTMAX_H
 
 #include "sdnn_integers.h"
+#include "sdnn_missing.h"
 
 #define SDNN_LARGEST_PART (UINT32_C(1) << 30) /* the weight of the most probable action */
 #define SDNN_MOST_BITS (INT64_C(40) << 20)    /* below the most probable action */
@@ -54,8 +55,11 @@ static inline uint32_t sdnn_mean_place(const uint32_t* weights, uint32_t n, uint
 }
 
 #if SDNN_IS_BOX
-/* The action at a place of dimension d, in fixed point. */
+/* The action at a place of dimension d, in fixed point; SDNN_MISSING for SDNN_REFUSED. */
 static inline int32_t sdnn_action_at(uint32_t d, uint32_t place) {
+#ifdef SDNN_REFUSES
+  if (place == SDNN_REFUSED) return SDNN_MISSING;
+#endif
 #if SDNN_N_DIMENSIONS == 1
   const int32_t* const action = &sdnn_action_fixed[place >> 16];
 #else

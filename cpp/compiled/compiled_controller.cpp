@@ -64,6 +64,7 @@ void take(const Box& box, ObservationConfig& config) {
                      "numbers, one per variable as in observation.low");
   for (std::size_t i = 0; i < box.low.size(); ++i) {
     const double low = box.low[i], high = box.high[i];
+    core::require(low <= high, "observation.low", "at most observation.high, and not NaN", low);
     // Running ranges ignore bounds, even equal ones.
     const bool is_known =
         std::isfinite(low) && std::isfinite(high) && (low < high || !config.running);
@@ -98,6 +99,10 @@ json json_of(const SettingValue& value) {
 
 ControllerConfig config_of(const AgentSpec& spec) {
   ControllerConfig config = preset_of(spec);
+  const auto running = spec.settings.find("observation.running");
+  if (running != spec.settings.end()) {
+    if (const bool* is = std::get_if<bool>(&running->second)) config.observation.running = *is;
+  }
   take(spec.observation, config.observation);
   core::require(spec.agent != "fuzzy" || std::holds_alternative<Box>(spec.action), "action",
                 "a Box for the agent fuzzy", "whole numbers");

@@ -431,8 +431,7 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
             agent.wrappers = read_statistics(description["wrappers"])
         if "scaling" in description:
             agent.scaling = Scaling.of_values(description["scaling"], n_variables)
-        has_masks = description.get("action_masks", False)
-        agent._actions.has_masks = flag("action_masks", has_masks)
+        agent._actions.has_masks = flag("action_masks", description.get("action_masks", False))
         agent._next_episode = whole("next_episode", description.get("next_episode", 0), 0, 2**53)
         return agent
 

@@ -272,8 +272,9 @@ class BaseAgent(Advised, abc.ABC, Generic[Approximator, Learning]):
         explore = flag("explore", explore)
         self._check_environment(environment)
         variables = self._observations.vector("observation", observation)
-        allowed = self._actions.mask("mask", mask, is_learned=explore)
+        allowed = self._actions.mask("mask", mask)
         numbers = self._controller.act(variables, explore, environment, allowed)
+        self._actions.has_masks |= explore and allowed is not None
         return self._actions.elements(numbers)[0]
 
     def flat_observation(self, observation: Element) -> NDArray[np.float64]:
@@ -310,6 +311,7 @@ class BaseAgent(Advised, abc.ABC, Generic[Approximator, Learning]):
         parts = self._parts_of(transition, environment)
         self._check_environment(environment)
         self._controller.learn(*parts)
+        self._actions.has_masks |= transition.next_mask is not None
         self.warn_of_problems()
 
     def check(self, transition: Transition) -> None:
@@ -363,7 +365,9 @@ class BaseAgent(Advised, abc.ABC, Generic[Approximator, Learning]):
         actions = self._actions
         if functions != [BaseAgent.act, BaseAgent.learn]:
             return None
-        return CoreParts(self._controller, self._observations.rows, actions.elements, actions.mask)
+        return CoreParts(
+            self._controller, self._observations.rows, actions.elements, actions.learned_mask
+        )
 
     @property
     def scaling(self) -> Scaling | None:

@@ -343,7 +343,8 @@ def meet_states(agent: AnyAgent, env: Env, seed: int = 0, options: Data | None =
             if len(watched.states) == MOST_STEPS:
                 break
         number += 1
-    masks = [mask for mask in watched.masks if mask is not None]
+    sizes = [mask.size for mask in watched.masks if mask is not None]
+    masks = [np.ones(sizes[0], np.bool_) if m is None else m for m in watched.masks if sizes]
     states = States(np.array(watched.states), np.array(masks) if masks else None)
     states = states.chosen(np.isfinite(states.rows).all(axis=1))
     require(len(states.rows) > 1, "env", "give observations without missing readings", env)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -186,7 +186,7 @@ def export(
         if flash is not None and header.flash_bytes > flash:
             raise click.UsageError(
                 f"--flash must be at least {header.flash_bytes}, for the constants of this agent,"
-                f" got {flash}: make it with --preset small, or fewer units or inputs"
+                f" got {flash}: make it with fewer units or inputs, such as by --ram with --new"
             )
         write_whole(path, header.text.encode())
     for warning in _coarse_ranges(agent, header.fraction_bits):

@@ -250,7 +250,7 @@ class Actions:
     config : ActionConfig
         The core's settings.
     has_masks : bool
-        Whether there was a mask, except of greedy actions.
+        Whether an agent explored or learned with a mask.
     """
 
     def __init__(self, space: Space) -> None:
@@ -299,7 +299,7 @@ class Actions:
         are_within = (self.config.low <= values) & (values <= self.config.high)
         return len(rows) == 0 or (is_alike and bool(are_within.all()))
 
-    def mask(self, name: str, mask: Any, is_learned: bool = True) -> NDArray[np.uint8] | None:
+    def mask(self, name: str, mask: Any) -> NDArray[np.uint8] | None:
         """Convert a mask to a flat array, with 1 for allowed actions; ValueError if it is none.
 
         One array of all actions, or one for each dimension; None: all actions are allowed.
@@ -317,8 +317,13 @@ class Actions:
         require([part.size for part in parts] == sizes, name, expected, mask)
         allowed = np.concatenate(parts)
         require(((allowed == 0) | (allowed == 1)).all(), name, "be 0 or 1 per action", mask)
-        self.has_masks |= is_learned
         return allowed.astype(np.uint8)
+
+    def learned_mask(self, name: str, mask: Any) -> NDArray[np.uint8] | None:
+        """Convert a mask of an agent that learns; see `mask`."""
+        allowed = self.mask(name, mask)
+        self.has_masks |= allowed is not None
+        return allowed
 
     def numbers(self, action: Element) -> Array:
         """Return the numbers of an element as an array; ValueError if it has other values."""

@@ -247,7 +247,7 @@ class Writer(ABC, Generic[Network]):
             return [f"A reading may be {name}_MISSING: it counts as the last one of the episode."]
         return [
             f"With {name}_REFUSES defined before the include, an observation in which a reading",
-            f"is {name}_MISSING gives the action {name}_REFUSED, and nothing is learned of it.",
+            f"is {name}_MISSING gives {name}_REFUSED, the number of no action, and is not learned.",
         ]
 
     def _usage(self) -> list[str]:

@@ -241,11 +241,13 @@ class _Run:
                 for key, episode in reported
                 if key in self.placed
             ]
-            yield [
-                ended(self.placed.pop(future.key), result)
-                for future, result in completed.next_batch(block=False)
-                if future.key in self.placed
-            ]
+            batch: list[Message] = []
+            try:
+                for future, result in completed.next_batch(block=False):
+                    if future.key in self.placed:
+                        batch.append(ended(self.placed.pop(future.key), result))
+            finally:  # an error ends the run, and what was finished before it is stored
+                yield batch
 
     def update_workers(self) -> Generator[Message, None, None]:
         """Admit new workers with the same build; resubmit trials whose workers are all lost."""

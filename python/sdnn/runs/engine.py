@@ -19,6 +19,7 @@ from signal import SIGINT, SIGTERM
 from typing import NamedTuple, Protocol
 
 from sdnn.agents.registry import title_of
+from sdnn.runs.errors import StoreError
 from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import ResultStore
 from sdnn.runs.trial import TrainingTrial, Trial, TrialKey, TrialRecord, opened, rows_of
@@ -209,14 +210,20 @@ def run_trials(
     failures: list[Failed] = []
     n_run = 0
 
+    def add(finished: Sequence[Finished]) -> None:
+        for message in finished:
+            store.add(message.record, is_exact=message.planned.spec.is_compiled)
+
     def keep(ended: Sequence[Finished | Failed]) -> None:
         nonlocal n_run
         failures.extend(message for message in ended if isinstance(message, Failed))
         finished = [message for message in ended if isinstance(message, Finished)]
-        if finished:
-            with store.together():
-                for message in finished:
-                    store.add(message.record, is_exact=message.planned.spec.is_compiled)
+        try:
+            if finished:
+                with store.together():
+                    add(finished)
+        except StoreError:  # of one trial: those before it are stored
+            add(finished)
         n_run += len(finished)
 
     interrupted, signal = execute(missing, keep, executor, observer, n_reused=n_reused)

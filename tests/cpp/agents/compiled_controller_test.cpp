@@ -156,6 +156,10 @@ TEST(CompiledController, NamesWhatIsWrongWithASpecification) {
             "observation.low must be of one variable at least, got 0");
   EXPECT_EQ(error_with([](AgentSpec& spec) { spec.observation.low[0] = 1.0; }),
             "observation.high[0] must be finite and greater than observation.low, got 1");
+  EXPECT_EQ(error_with([](AgentSpec& spec) {
+              spec.observation.low[0] = std::numeric_limits<double>::quiet_NaN();
+            }),
+            "observation.low must be at most observation.high, and not NaN, got nan");
   EXPECT_EQ(with_action(Discrete{.n = 0}), "action.n must be at least 1, got 0");
   EXPECT_EQ(with_action(MultiDiscrete{.n = {2, 3}, .start = {0}}),
             "action.start must be 2 numbers, one per dimension as in action.n, got 1");

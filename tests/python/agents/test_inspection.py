@@ -27,6 +27,7 @@ from sdnn.agents.inspection import (
 from sdnn.agents.schedules import schedule_of
 from sdnn.agents.state_maps import N_ON_MAP, map_of, replay
 from sdnn.environments import ActionMasks
+from sdnn.export import c_header
 from sdnn.training.training import Callback
 
 FIXED = {"inputs": "all", "angle_pairs": "none", "history": "none"}
@@ -391,6 +392,19 @@ def test_masked_actions_are_in_no_map_and_no_greedy_episode(agent_class):
     for influence in influences(reader, states, inputs):
         assert np.isfinite([influence.on_values, influence.on_actions]).all()
     assert replay(reader, env, 3).actions.shape == (1, 1)
+
+
+def test_states_without_a_mask_allow_all_actions_and_inspecting_is_no_learning_with_masks():
+    class OpenDoors(Doors):
+        def _meet(self):
+            observation, info = super()._meet()
+            return observation, {"action_mask": None} if self._n_allowed == 3 else info
+
+    agent = SDNNQLambda(box(2), gym.spaces.Discrete(3), seed=1, **FIXED)
+    states = meet_states(agent, OpenDoors())
+    n_allowed = 1 + ((states.rows[:, 0] + 1.0) * 1.5).astype(int)
+    np.testing.assert_array_equal(states.allowed.sum(axis=1), n_allowed)
+    assert "policy" in c_header(agent, "policy").text
 
 
 def test_masks_are_kept_at_the_symbols_where_they_hold():

@@ -359,6 +359,9 @@ def test_an_agent_that_has_learned_with_action_masks_is_refused(tmp_path):
     acted.act(1, mask=[1, 0])
     learned_next.learn(Transition(0, 1, 1.0, 2, terminated=False, next_mask=[1, 0]))
     greedy.act(1, explore=False, mask=[1, 0])
+    greedy.check(Transition(0, 1, 1.0, 2, terminated=False, next_mask=[1, 0]))
+    with pytest.raises(ValueError, match="observation"):
+        greedy.act(3, mask=[1, 0])
     for agent in (acted, learned_next):
         agent.save(tmp_path / "masked.safetensors")
         for masked in (agent, load_agent(tmp_path / "masked.safetensors")):

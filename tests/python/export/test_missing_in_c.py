@@ -232,6 +232,21 @@ def test_symbols_and_angles_are_missing_if_one_of_their_variables_is(missing, ta
     np.testing.assert_array_equal(bins[0], last)
 
 
+def test_the_action_at_a_refused_place_is_missing(target, tmp_path):
+    agent = new_agent(box(1.0), gym.spaces.Box(-2.0, 2.0), kind="actor-critic")
+    (tmp_path / "policy.h").write_text(c_header(agent, "policy").text)
+    source = """
+        #define POLICY_REFUSES
+        #include "policy.h"
+        int main(void) {
+          const int32_t missing = POLICY_MISSING, read = 0;
+          return policy_action_at(0, policy_place(&missing)) != POLICY_MISSING
+            || policy_action_at(0, policy_place(&read)) == POLICY_MISSING;
+        }
+    """
+    run(program(tmp_path, source, target.compiler, *STRICT, *SANITIZED))
+
+
 @pytest.mark.parametrize("missing", ["error", "hold", "code"])
 @pytest.mark.parametrize("kind", ["q-lambda", "actor-critic", "sdnn-c"])
 def test_headers_state_their_memory_and_are_cpp(kind, missing, needs, tmp_path):

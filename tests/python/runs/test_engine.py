@@ -2,6 +2,7 @@ import io
 import os
 import signal
 import time
+from dataclasses import replace
 
 import pytest
 from rich.console import Console
@@ -21,7 +22,7 @@ from sdnn.runs.engine import (
     run_to_end,
     teams_of,
 )
-from sdnn.runs.trial import records_digest
+from sdnn.runs.trial import TrialRows, records_digest
 
 
 def test_the_number_of_jobs_does_not_change_the_stored_rows(tmp_path, run):
@@ -317,6 +318,30 @@ def test_trials_that_end_together_are_stored_in_one_transaction(tmp_path, run, u
         assert records_digest(store.load()) == run(tmp_path / "one by one", plan)[1]
     assert seen == [len(plan)] * len(plan)
     assert statements.count("COMMIT") == 1
+
+
+def test_a_trial_that_cannot_be_stored_loses_none_that_ended_before_it(tmp_path, run, record):
+    plan = fake_trial.make_plan(1)
+    run(tmp_path / "out", plan[1:])
+    (stored,) = records_of(tmp_path / "out")
+    table = stored.rows.table.copy()
+    table["length"] += 1
+    other = replace(stored, rows=TrialRows(table))
+
+    class AllAtOnce(Scripted):
+        def run(self, planned, stop):
+            yield [Finished(plan[0], record), Finished(plan[1], other)]
+
+    with ResultStore(tmp_path / "out") as store:
+        store.keys = set  # as if another process had stored the second one meanwhile
+        with pytest.raises(StoreError, match="two results"):
+            run_trials(plan, store, executor=AllAtOnce())
+    assert {record.key for record in records_of(tmp_path / "out")} == {p.key for p in plan}
+
+
+def records_of(folder):
+    with ResultStore(folder, read_only=True) as store:
+        return store.load()
 
 
 def test_an_empty_plan_runs_no_executor(tmp_path, run):
