@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.agents.presets import presets_of
+from sdnn.agents.base import presets_of
 from sdnn.agents.q_learning import ValueAgent
 from sdnn.config import ActorCriticConfig, LinearSDNNConfig
 

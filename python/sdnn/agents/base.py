@@ -7,6 +7,7 @@ import secrets
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, ClassVar, Generic, TypeVar, cast
 
 import msgspec
@@ -59,6 +60,22 @@ _MOST_ENVIRONMENTS = 2**14
 
 Approximator = TypeVar("Approximator")
 Learning = TypeVar("Learning")
+
+
+def presets_of(listed: Mapping[str, tuple[Any, ...]]) -> Mapping[str, Preset]:
+    """Return the presets of the core by name."""
+    presets = {}
+    for name, settings in listed.items():
+        title, approximator, learning, observed = (*settings, _core.ObservationConfig())[:4]
+        presets[name] = Preset(
+            title, approximator, learning,
+            "find" if observed.find_angle_pairs else "none",
+            "relevant" if observed.relevant_only else "all",
+            observed.history,
+            "running" if observed.running else None,
+            observed.narrowed,
+        )  # fmt: skip
+    return MappingProxyType(presets)
 
 
 class BaseAgent(Advised, abc.ABC, Generic[Approximator, Learning]):

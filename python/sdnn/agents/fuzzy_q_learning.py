@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
 from sdnn.agents.agent import Agent
-from sdnn.agents.presets import presets_of
+from sdnn.agents.base import presets_of
 from sdnn.config import FuzzyQLearningConfig, FuzzyRulesConfig
 from sdnn.environments.types import Space
 from sdnn.support.arguments import whole

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sdnn import _core
-from sdnn.agents.presets import presets_of
+from sdnn.agents.base import presets_of
 from sdnn.agents.q_learning import ValueAgent
 from sdnn.config import LinearSDNNConfig, QLambdaConfig
 from sdnn.environments.types import Data

@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
 from sdnn.agents.agent import Agent
-from sdnn.agents.base import Approximator, Learning
-from sdnn.agents.presets import presets_of
+from sdnn.agents.base import Approximator, Learning, presets_of
 from sdnn.config import QLearningConfig, RBFNetworkConfig, SDNNCConfig
 from sdnn.environments.types import Array, Data
 from sdnn.support.arguments import real

@@ -85,7 +85,7 @@ _MEANINGS: Mapping[tuple[str, ...], tuple[str, ...]] = {
         "state() has all arrays; save(path) and load_agent(path) keep everything",),
     ("load", "load_model"): ("load_agent", "from sdnn.agents import load_agent"),
     ("PPO", "A2C", "DQN", "SAC", "TD3", "DDPG", "HER", "QRDQN", "TRPO", "TQC", "RecurrentPPO",
-     "MaskablePPO", "CrossQ"): (_AGENTS,),
+     "MaskablePPO", "CrossQ"): ("q-lambda", _AGENTS),
     ("save_path", "log_dir", "logdir", "save_dir", "output_dir"): ("out", "path"),
     ("epochs", "n_epochs", "num_epochs", "nb_epoch", "n_iter"): ("max_iter", "epochs"),
     ("patience", "max_no_improvement_evals"): ("n_iter_no_change", "max_evaluations"),

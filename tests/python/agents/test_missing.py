@@ -15,7 +15,6 @@ from sdnn.agents import (
     Transition,
     evaluate,
 )
-from sdnn.export import c_header
 
 SPACE = gym.spaces.Dict(
     {"a": gym.spaces.Box(-1.0, 3.0, (2,)), "b": gym.spaces.Discrete(3), "c": gym.spaces.Box(-2, 2)}
@@ -91,8 +90,6 @@ def test_missing_readings_and_unsupported_modes_are_refused_with_a_remedy():
     for agent_class in (RBFQLearning, FuzzyQLearning):
         refuses("'hold'", agent_of, agent_class, "code")
     refuses("missing", agent_of, SDNNQLambda, "drop")
-    for missing in ("hold", "code"):
-        refuses("missing='error'", c_header, agent_of(SDNNQLambda, missing), "robot")
 
 
 @pytest.mark.parametrize("missing", ["hold", "code"])
