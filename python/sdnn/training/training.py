@@ -106,6 +106,12 @@ def checked_callbacks(callbacks: Iterable[Callback]) -> tuple[Callback, ...]:
         raise TypeError(f"callbacks must be a list of callbacks, got {shown(callbacks)}") from None
     for callback in checked:
         has_methods("callbacks", callback, "callbacks", "on_start", "on_step", "on_row", "on_end")
+        for name in ("_on_step", "_on_rollout_end", "_on_training_start", "_on_training_end"):
+            if hasattr(callback, name):  # of Stable-Baselines3; it would never be called
+                raise TypeError(
+                    f"callbacks must not have {name}, got {shown(callback)}: Callback has"
+                    " on_start, on_step, on_row and on_end; training.stop() ends a training"
+                )
     return checked
 
 

@@ -426,3 +426,19 @@ def test_a_training_calls_methods_replaced_on_the_instance():
     agent.learn = lambda transition: (transitions.append(transition), learn(transition))
     agent.train(env, steps=5)
     assert len(transitions) == 5
+
+
+@pytest.mark.parametrize("module", ["sdnn.common", "sdnn.common.env_util"])
+def test_modules_of_stable_baselines3_are_answered_with_ours(module):
+    with pytest.raises(ModuleNotFoundError, match=r"sdnn\.agents.*make_vec"):
+        importlib.import_module(module)
+
+
+def test_callbacks_with_methods_of_stable_baselines3_are_refused(trained):
+    class Watching(Callback):
+        def _on_step(self):
+            return False
+
+    agent, env, _ = trained
+    error = refuses("_on_step", agent.train, env, steps=5, callbacks=[Watching()], error=TypeError)
+    assert "training.stop()" in str(error)
