@@ -215,7 +215,7 @@ def rows_of(name, firmware, folder, outputs_to_score):
     outputs, *others = (outputs for _, outputs in measured.values() if outputs is not None)
     if name.startswith("sdnn"):
         assert all(np.array_equal(outputs, other) for other in others)
-    boards = {board: taken for board, (taken, _) in measured.items()}
+    boards = {board: cost for board, (cost, _) in measured.items()}
     return {"model": name, "score": outputs_to_score(outputs), "boards": boards}
 
 
@@ -227,8 +227,8 @@ def measure_problem(name, folder):
     for model, candidates in OTHERS.items():
         for firmware in candidates(problem):
             row = rows_of(model, firmware, folder, problem.score)
-            taken = row["boards"]["cortex-m0"]
-            if taken and taken["flash"] <= MOST_FLASH:
+            cost = row["boards"]["cortex-m0"]
+            if cost and cost["flash"] <= MOST_FLASH:
                 break
         yield {"problem": name, **row}
 
@@ -272,7 +272,7 @@ COLUMNS = ("flash, bytes", "RAM, bytes", "instructions, Cortex-M0", "Cortex-M4F"
 def _cells(boards):
     """Sizes on the smallest board that has room, and the instructions of a call on each."""
     sizes = boards["cortex-m0"] or boards["cortex-m4"]
-    calls = [f"{taken['instructions']:,}" if taken else "too large" for taken in boards.values()]
+    calls = [f"{cost['instructions']:,}" if cost else "too large" for cost in boards.values()]
     return [f"{sizes['flash']:,}", f"{sizes['ram']:,}", *calls]
 
 

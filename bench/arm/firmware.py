@@ -69,12 +69,12 @@ def measure(firmware, board, folder):
         counts.append(int(re.search(rb"instructions (\d+)", done.stderr)[1]))
         outputs = done.stdout
     stack = int(np.frombuffer(outputs[-4:], "<u4")[0])
-    taken = {
+    cost = {
         "flash": sizes[0] - base[0],
         "ram": sizes[1] - base[1] + stack,
         "instructions": round((counts[1] - counts[0]) / len(firmware.rows)),
     }
-    return taken, np.frombuffer(outputs[:-4], firmware.result)
+    return cost, np.frombuffer(outputs[:-4], firmware.result)
 
 
 def _compiled(firmware, board, folder):
