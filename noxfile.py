@@ -18,6 +18,8 @@ nox.options.error_on_missing_interpreters = True
 
 ROOT = Path(__file__).parent
 JOBS = str(os.cpu_count() or 1)
+if shutil.which("ccache"):
+    os.environ.setdefault("CMAKE_CXX_COMPILER_LAUNCHER", "ccache")
 CPP_PRESETS = ["gcc", "clang", "sanitize", "tsan", "assertions", "aarch64", "libcxx", "arm32"]
 
 
@@ -42,9 +44,8 @@ def pytest(session, *arguments):
 
 
 def cmake_build(session, preset, *targets):
-    """Configure and build a preset of CMakePresets.json, with ccache if it is installed."""
-    launcher = ["-DCMAKE_CXX_COMPILER_LAUNCHER=ccache"] if shutil.which("ccache") else []
-    session.run("cmake", "--preset", preset, *launcher, external=True)
+    """Configure and build a preset of CMakePresets.json."""
+    session.run("cmake", "--preset", preset, external=True)
     session.run("cmake", "--build", "--preset", preset, "--parallel", JOBS, *targets, external=True)
 
 
@@ -182,9 +183,8 @@ def test_with(session, interpreter, resolution, *tests):
     python_of = Path(session.create_tmp(), resolution, "bin", "python")
     uv = [sys.executable, "-m", "uv"]
     session.run(*uv, "venv", "--clear", f"--python={interpreter}", python_of.parents[1])
-    launcher = {"CMAKE_CXX_COMPILER_LAUNCHER": "ccache"} if shutil.which("ccache") else {}
     install = [*uv, "pip", "install", "-q", f"--python={python_of}", f"--resolution={resolution}"]
-    session.run(*install, "--reinstall-package=sdnn-learn", ".[test]", env=launcher)
+    session.run(*install, "--reinstall-package=sdnn-learn", ".[test]")
     paths = [str(Path("tests", "python", name)) for name in tests]
     session.run(python_of, "-m", "pytest", "-q", *paths, *session.posargs, external=True)
 
@@ -201,25 +201,25 @@ def robustness(session):
     pytest(session, "tests/robustness")
 
 
+@weekly(name="robustness-weekly")
+def robustness_weekly(session):
+    """Try all bad values, seven times as many."""
+    os.environ["SDNN_WEEKLY"] = "1"
+    pytest(session, "tests/robustness/test_bad_values.py")
+
+
 @quick()
 def soak(session):
-    """Let agents learn in random spaces under AddressSanitizer and UBSan; ``-- --lives 2000``."""
-    run_soak(session, *session.posargs)
+    """Let agents learn in random spaces with random settings."""
+    python(session, "tests/robustness/soak.py", *session.posargs)
 
 
 @weekly(name="soak-weekly")
 def soak_weekly(session):
-    """Run 2,000 random lives under sanitizers."""
-    run_soak(session, "--lives", "2000")
-
-
-def run_soak(session, *arguments):
-    """Build the package with sanitizers in a folder, and run random lives with it."""
+    """Build the package with AddressSanitizer and UBSan, and run 2,000 random lives with it."""
     folder, flags = ROOT / "build" / "asan", "-O1 -g1 -fsanitize=address,undefined"
     install = ["pip", "install", "-q", "--no-deps", "--no-build-isolation", "--upgrade"]
     defines = [f"-Ccmake.define.CMAKE_CXX_FLAGS={flags} -fno-sanitize-recover=all"]
-    if shutil.which("ccache"):
-        defines.append("-Ccmake.define.CMAKE_CXX_COMPILER_LAUNCHER=ccache")
     python(session, "-m", *install, f"--target={folder}", "-Ccmake.build-type=None", *defines, ".")
     libraries = [
         session.run("g++", f"-print-file-name=lib{name}.so", silent=True, external=True).strip()
@@ -228,6 +228,7 @@ def run_soak(session, *arguments):
     options = "detect_leaks=0:allocator_may_return_null=1"
     environment = {"LD_PRELOAD": " ".join(libraries), "ASAN_OPTIONS": options}
     environment["PYTHONPATH"] = str(folder)
+    arguments = session.posargs or ("--lives", "2000")
     python(session, "tests/robustness/soak.py", *arguments, env=environment)
 
 
@@ -256,7 +257,7 @@ def fuzz(session):
     ``nox -s fuzz -- --seconds 600`` for ten minutes each; build/fuzzing/counts.json sums up.
     """
     cmake_build(session, "fuzz")
-    arguments = ("--out", "build/fuzzing", "--seconds", "8", "--jobs", JOBS)
+    arguments = ("--out", "build/fuzzing", "--seconds", "4", "--jobs", JOBS)
     python(session, "tests/fuzz/campaign.py", *arguments, *session.posargs)
 
 

@@ -19,6 +19,9 @@ from sdnn.agents import (
     load_agent,
 )
 
+pytestmark = pytest.mark.xdist_group("compiled controller")
+"""Every process of the tests would compile the library for itself."""
+
 ROOT = Path(__file__).parents[2]
 
 PROJECT = """

@@ -1,6 +1,6 @@
 """Bad values of every argument, setting, option and file are refused by name, or work.
 
-This is a sample; ``nox -s robustness`` tries all.
+This is a sample; ``nox -s robustness`` tries more, ``nox -s robustness-weekly`` all.
 """
 
 import pytest
@@ -20,7 +20,7 @@ EVERY = {"agents": 41, "core": 41, "classes": 41, "commands": 29, "files": 47}
 def test_a_sample_of_bad_values_is_refused_by_name_or_accepted(matrix, monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     monkeypatch.setenv("MPLBACKEND", "Agg")
-    n_cells, failed = failures(sample_cells, matrix, EVERY[matrix])
+    n_cells, failed = failures(sample_cells, MATRICES[matrix], EVERY[matrix])
     assert failed == []
     assert n_cells >= 40
 

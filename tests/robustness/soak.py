@@ -1,6 +1,6 @@
 """Let agents learn in random spaces with random settings: python tests/robustness/soak.py.
 
-``nox -s soak`` runs it under sanitizers. ``--first NUMBER --lives 1`` repeats a life that failed.
+``nox -s soak-weekly`` runs it under sanitizers; ``--first NUMBER --lives 1`` repeats a life.
 """
 
 import argparse

@@ -52,8 +52,6 @@ COMMANDS = {
 }
 """Good arguments and options, with which the commands work and end soon."""
 
-_LASTING = tempfile.TemporaryDirectory()
-
 LEFT_OUT = {"bench"}
 """Measures for a minute whatever its options, which are flags."""
 
@@ -61,8 +59,7 @@ LEFT_OUT = {"bench"}
 @functools.cache
 def run_folder():
     """A run that is done, in a folder that lasts as long as the process."""
-    folder = _LASTING.name
-    run = os.path.join(folder, "run")
+    run = os.path.join(tempfile.mkdtemp(), "run")
     settings = ["n_pattern_units=20", "n_hidden_units=60", "n_active_units=20"]
     options = [word for setting in settings for word in ("--set", f"approximator.{setting}")]
     arguments = ["train", "MountainCar-v0", "--agent", "sdnn-c", "--steps", "60", *options]

@@ -3,6 +3,8 @@
 A row is a function that makes cells and its arguments; `watched_cells.failures` runs it.
 """
 
+import itertools
+
 import bad_inputs
 import bad_options
 import core_cells
@@ -55,11 +57,7 @@ def name_of(row):
     return "-".join([row[0].__name__, *map(str, row[1:])])
 
 
-def sample_cells(matrix, every):
-    """Some cells of all rows of a matrix, spread over parameters and values alike."""
-    number = 0
-    for make_cells, *arguments in MATRICES[matrix]:
-        for cell in make_cells(*arguments):
-            if number % every == 0:
-                yield cell
-            number += 1
+def sample_cells(rows, every):
+    """Some cells of rows, spread over parameters and values alike."""
+    cells = (cell for make_cells, *arguments in rows for cell in make_cells(*arguments))
+    yield from itertools.islice(cells, 0, None, every)

@@ -3,6 +3,7 @@
 import multiprocessing
 import os
 import resource
+import sys
 import tempfile
 import time
 import warnings
@@ -24,7 +25,10 @@ def failures(make_cells, *arguments):
     Each is in an empty folder of its own. It has `CELL_SECONDS` and `HEADROOM` bytes; a process
     that ends, or is ended after `HANG_SECONDS` without a word, is followed by another one.
     """
-    context = multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    # The server imports what cells use, once; it takes its search path from the environment.
+    os.environ["PYTHONPATH"] = os.pathsep.join(dict.fromkeys(filter(None, sys.path)))
+    context.set_forkserver_preload([make_cells.__module__])
     failed, first, n_cells = [], 0, None
     while n_cells is None or first < n_cells:
         here, there = context.Pipe(duplex=False)
