@@ -42,7 +42,7 @@ typedef struct {
   uint32_t n_snapshots, phase; /* of the average, and steps since the last one */
   uint32_t n_random_left;      /* steps that will still be random */
   uint32_t n_ended;            /* episodes that terminated, up to 20 */
-  uint32_t n_kept;             /* steps that the random action will still last */
+  uint32_t n_kept;             /* steps that the random action, or the excursion, still lasts */
   uint32_t step;               /* of the episode */
   uint32_t kept[SDNN_N_DIMENSIONS], action[SDNN_N_DIMENSIONS];
   sdnn_states states;
@@ -50,6 +50,7 @@ typedef struct {
   uint8_t pending;    /* the code of the state of the pending transition */
   uint8_t is_pending; /* whether a transition is to be learned */
   uint8_t has_exponent;
+  uint8_t is_excursion;
   uint8_t is_live[SDNN_N_ROWS]; /* rows of traces that are not all 0 */
 } sdnn_agent;
 
@@ -171,8 +172,18 @@ static inline int sdnn_lacks_rewards(const sdnn_agent* agent) {
 
 static inline uint32_t sdnn_larger(uint32_t a, uint32_t b) { return a > b ? a : b; }
 
-/* Whether the next action is a random one, which is in agent->kept then. */
-static inline int sdnn_explores(sdnn_agent* agent) {
+#define SDNN_BEST 0
+#define SDNN_RANDOM 1 /* the action is in agent->kept */
+#define SDNN_WORST 2  /* on an excursion from good states, which long episodes have */
+#define SDNN_MAKES_EXCURSIONS (SDNN_SEARCHES && !SDNN_IS_SARSA)
+#define SDNN_LONG_EPISODE 2000
+#define SDNN_DRAWS_FOR_EXCURSION 4
+
+/* Which action the next step takes. */
+static inline int sdnn_kind_of_action(sdnn_agent* agent) {
+  const uint32_t most = (uint32_t)SDNN_MAX_ACTION_REPEAT >> agent->n_ended;
+  const uint32_t least = SDNN_MAX_ACTION_REPEAT < 5 ? SDNN_MAX_ACTION_REPEAT : 5;
+  const uint32_t longest = sdnn_larger(most, least);
   const uint32_t step = agent->step++;
   const int may_explore = sdnn_may_explore(step) && agent->epsilon > 0;
   const int is_left = agent->n_random_left > 0 && (SDNN_START_STEPS > 0 || may_explore);
@@ -181,11 +192,20 @@ static inline int sdnn_explores(sdnn_agent* agent) {
   if (is_left) --agent->n_random_left;
   if (agent->n_kept > 0) {
     --agent->n_kept;
-    return 1;
+    return agent->is_excursion ? SDNN_WORST : SDNN_RANDOM;
   }
   if (!at_random && !(may_explore && sdnn_bits(&agent->randoms[SDNN_EXPLORATION]) >> 11 <
                                          (uint64_t)agent->epsilon << 37)) {
-    return 0;
+    return SDNN_BEST;
+  }
+  if (SDNN_MAKES_EXCURSIONS) {
+    sdnn_random* const repetitions = &agent->randoms[SDNN_REPETITIONS];
+    agent->is_excursion = !at_random && step >= SDNN_LONG_EPISODE &&
+                          sdnn_below(repetitions, SDNN_DRAWS_FOR_EXCURSION) == 0;
+    if (agent->is_excursion) {
+      agent->n_kept = (uint32_t)sdnn_below(repetitions, longest);
+      return SDNN_WORST;
+    }
   }
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
     agent->kept[d] = (uint32_t)sdnn_below(&agent->randoms[SDNN_EXPLORATION], sdnn_n_actions[d]);
@@ -194,12 +214,18 @@ static inline int sdnn_explores(sdnn_agent* agent) {
     agent->n_kept = (uint32_t)sdnn_below(&agent->randoms[SDNN_REPETITIONS],
                                          (uint64_t)SDNN_MAX_ACTION_REPEAT / 2);
   } else if (SDNN_MAX_ACTION_REPEAT > 1) {
-    const uint32_t most = (uint32_t)SDNN_MAX_ACTION_REPEAT >> agent->n_ended;
-    const uint32_t least = SDNN_MAX_ACTION_REPEAT < 5 ? SDNN_MAX_ACTION_REPEAT : 5;
-    agent->n_kept =
-        sdnn_repetitions(&agent->randoms[SDNN_REPETITIONS], sdnn_larger(most, least)) - 1;
+    agent->n_kept = sdnn_repetitions(&agent->randoms[SDNN_REPETITIONS], longest) - 1;
   }
-  return 1;
+  return SDNN_RANDOM;
+}
+
+/* The first action of the lowest value. */
+static inline uint32_t sdnn_smallest_of(const int64_t* sums, uint32_t n_actions) {
+  uint32_t worst = 0, i;
+  for (i = 1; i < n_actions; ++i) {
+    if (sums[i] < sums[worst]) worst = i;
+  }
+  return worst;
 }
 
 /* The tolerance of ties in units of 2^exponent. */
@@ -213,13 +239,15 @@ static inline int64_t sdnn_tie_tolerance(int32_t exponent) {
 static inline void sdnn_act_in_each(sdnn_agent* agent, const int32_t* observation,
                                     uint32_t* action) {
   uint32_t bins[SDNN_N_INPUTS], d;
-  int64_t sums[SDNN_MOST_ROWS];
+  int64_t sums[SDNN_MOST_ROWS], least;
   const sdnn_code* code;
+  int choice;
   if (SDNN_IS_REFUSED(int32_t, observation)) {
     sdnn_refuse(action);
     return;
   }
-  if (sdnn_explores(agent)) {
+  choice = sdnn_kind_of_action(agent);
+  if (choice == SDNN_RANDOM) {
     for (d = 0; d < SDNN_N_DIMENSIONS; ++d) action[d] = agent->kept[d];
     if (SDNN_REMEMBERS) {
       sdnn_read_to_act(&agent->states, observation, bins);
@@ -231,8 +259,11 @@ static inline void sdnn_act_in_each(sdnn_agent* agent, const int32_t* observatio
   code = sdnn_other(agent, bins);
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
     sdnn_sums(agent->weights, code, d, sums);
-    const int64_t least =
-        sdnn_largest(sums, sdnn_n_actions[d]) - sdnn_tie_tolerance(agent->exponent);
+    if (choice == SDNN_WORST) {
+      action[d] = sdnn_smallest_of(sums, sdnn_n_actions[d]);
+      continue;
+    }
+    least = sdnn_largest(sums, sdnn_n_actions[d]) - sdnn_tie_tolerance(agent->exponent);
     action[d] = sdnn_draw_tied(sums, sdnn_n_actions[d], least, &agent->randoms[SDNN_ACTING]);
   }
   sdnn_note_act(&agent->states, action);

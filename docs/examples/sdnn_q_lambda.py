@@ -107,7 +107,7 @@ class QLambda:
 
     def begin_episode(self):
         self.end_trace()
-        self.n_kept = 0
+        self.n_kept, self.n_steps, self.is_excursion = 0, 0, False
 
     def end_trace(self):
         self.trace[:], self.old_value, self.next_state = 0, 0, None
@@ -145,25 +145,36 @@ class QLambda:
             #     actions that last, and for twice as many steps after the first reward, too.
             must_explore = self.n_random_left > 0 or self.lacks_rewards()
             self.n_random_left = max(self.n_random_left - 1, 0)
+            self.n_steps += 1
             if self.n_kept > 0:
                 self.n_kept -= 1
-                return self.random_action
+                return self.worst(state) if self.is_excursion else self.random_action
             if must_explore or self.exploration.uniform() < self.epsilon():
                 # (7) A random action is kept for at least k steps with probability 1 / k. Each
                 #     episode that terminates halves the longest duration, down to 5 steps.
+                longest = max(s.max_action_repeat >> self.n_terminated, min(5, s.max_action_repeat))
+                # (8) In endless episodes a fourth of these draws begins an excursion from good
+                #     states: its steps take the worst action.
+                is_long = self.n_steps > 2000 and s.max_action_repeat > 1 and not must_explore
+                self.is_excursion = is_long and self.repetitions.below(4) == 0
+                if self.is_excursion:
+                    self.n_kept = self.repetitions.below(longest)
+                    return self.worst(state)
                 n_actions = np.diff(self.first_rows)
                 self.random_action = [self.exploration.below(int(n)) for n in n_actions]
-                longest = max(s.max_action_repeat >> self.n_terminated, min(5, s.max_action_repeat))
                 if must_explore:
                     self.n_kept = self.repetitions.below(s.max_action_repeat // 2)
                 else:
                     self.n_kept = int(min(1 / (1 - self.repetitions.uniform()), longest)) - 1
                 return self.random_action
-        # (8) Without exploration, actions follow an average of the weights.
+        # (9) Without exploration, actions follow an average of the weights.
         weights = self.average if not explore and self.n_snapshots > 0 else self.weights
         ties = self.ties if explore else self.greedy_ties
         best = [np.flatnonzero(part == part.max()) for part in self.sums(self.code(state), weights)]
         return [int(tied[ties.below(len(tied)) if len(tied) > 1 else 0]) for tied in best]
+
+    def worst(self, state):
+        return [int(part.argmin()) for part in self.sums(self.code(state), self.weights)]
 
     def learn(self, state, action, reward, next_state, terminated):
         x, next_x = self.code(state), self.code(next_state)
@@ -193,7 +204,7 @@ class QLambda:
         value = self.value(x, action)  # the textbook's Q; old_value is its Q_old
         target = self.units_of(reward) + rounded(next_value * round(s.discount * 2**15), 15)
         drift, self.old_value = value - self.old_value, next_value
-        # (9) Alpha is divided by the number of weights that have a part in Q(s, a): a step of 1
+        # (10) Alpha is divided by the number of weights that have a part in Q(s, a): a step of 1
         #     corrects the whole error of a new state, and no step overshoots.
         n_weights = max(1, np.count_nonzero(x) * len(rows))
         rate = (max(1, self.scheduled(s.learning_rate, s.final_learning_rate)) << 12) // n_weights
@@ -230,7 +241,7 @@ class QLambda:
             self.average += rounded(self.weights - self.average, n_bits)
             self.n_snapshots = min(self.n_snapshots + 1, 3 * 2**10)
 
-    # (10) The unit follows the rewards: the first one has 31 bits. It doubles where a weight would
+    # (11) The unit follows the rewards: the first one has 31 bits. It doubles where a weight would
     #     need more than 23 bits, or a value more than 33.
 
     def units_of(self, reward):

@@ -64,6 +64,30 @@ def test_weights_are_those_of_the_numpy_transcription(
         np.testing.assert_array_equal(readout.weights(), transcription.weights)
 
 
+def test_excursions_of_an_endless_episode_are_those_of_the_numpy_transcription():
+    n_actions = [3, 2]
+    learning = {"epsilon": 0.2, "schedule_steps": 1000, "max_action_repeat": 40}
+    agent = _core.BareAgent(
+        approximator=LinearSDNNConfig(**SMALL),
+        n_actions=n_actions,
+        learning=QLambdaConfig(**learning),
+        seed=1,
+    )
+    options = {"bootstrap": "q_learning", "traces": "dutch", "seed": 1} | learning
+    page = QLambda(Code(agent.networks[0].code, 2), n_actions, 1, options)
+    rng, n_excursions = np.random.default_rng(0), 0
+    state = rng.random(2)
+    for _ in range(3000):
+        action = [int(index) for index in agent.act(state)]
+        assert action == [int(index) for index in page.act(state)]
+        n_excursions += page.is_excursion
+        reward, next_state = rng.normal(), rng.random(2)
+        for learner in (agent, page):
+            learner.learn(state, action, reward, next_state, False, 1.0)
+        state = next_state
+    assert 100 < n_excursions < 900  # of 1,000 steps
+
+
 def test_a_few_discrete_states_have_exact_independent_values(tmp_path):
     space = gym.spaces.Discrete(5, start=3)
     agent = SDNNQLambda(space, gym.spaces.Discrete(2), seed=1)

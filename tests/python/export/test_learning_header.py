@@ -76,6 +76,19 @@ def test_an_agent_in_c_searches_for_a_first_reward_like_the_agent(target, tmp_pa
     assert image == save_image(agent)
 
 
+def test_an_endless_episode_in_c_has_the_excursions_of_the_agent(target, tmp_path):
+    agent = discrete()
+    assert agent.learning.max_action_repeat > 1
+    header, command = build(tmp_path, agent, target, *SANITIZED)
+    lines = lines_of(agent, 4000, 6, header.fraction_bits)
+    lines = np.concatenate([lines[:1], lines[lines[:, 0] == 1]])
+    lines[:, -1] = 0  # nothing terminates
+    initial_image = save_image(agent)
+    actions, image = run_program(command, initial_image, lines, agent.n_dimensions)
+    assert actions == run_agent(agent, lines, header.fraction_bits)
+    assert image == save_image(agent)
+
+
 def test_extreme_readings_and_rewards_have_defined_results(target, tmp_path):
     # Half of the numbers are extreme; acting, learning and new episodes come in any order.
     for make in (discrete, sarsa, network, small_steps, actor):

@@ -34,15 +34,22 @@ namespace sdnn::agents {
 /// other than 0, an agent searches: all actions are random, and their lengths are uniform up to m /
 /// 2. A rare reward usually takes many steps in the same direction.
 ///
+/// In an episode without an end an agent would stay in good states and learn little of all others.
+/// After kLongEpisode steps of an episode, every fourth of the draws above begins an excursion
+/// instead, of a uniform length up to the longest at present: its steps take the worst action.
+///
 /// In its first start_steps steps an agent takes random actions only, so that it finds a rare
 /// success before greedy actions have learned to avoid effort. Source: the start_steps of Achiam,
 /// J. (2018), Spinning up in deep reinforcement learning; here the actions are repeated as above.
 class Exploration {
  public:
+  enum class Choice { best, random, worst };
+
   /// The state of the present episode in one environment.
   struct Episode {
     std::vector<std::size_t> kept;  ///< the random action
-    int n_kept = 0;                 ///< steps that it will still last
+    int n_kept = 0;                 ///< steps that it, or the excursion, will still last
+    bool is_excursion = false;
     int step = 0;
 
     void begin() noexcept {
@@ -77,25 +84,32 @@ class Exploration {
     n_random_left_ = static_cast<int>(std::min<std::int64_t>(2 * n_steps, most_random_left_));
   }
 
-  /// Returns whether the next step takes a random action, which is written to episode.kept: an
-  /// index below n_actions(d) in each dimension d, allowed by `mask`. A repeated action ends early
-  /// if it is no longer allowed. `lacks_order` means that no action is known to be better than
-  /// another; every step is random then.
+  /// Returns which action the next step takes. A random one is written to episode.kept: an index
+  /// below n_actions(d) in each dimension d, allowed by `mask`. A repeated action ends early if it
+  /// is no longer allowed. `lacks_order` means that no action is known to be better than another;
+  /// every step is random then. `may_leave` permits excursions.
   template <class NActions>
-  bool takes_random_action(Episode& episode, const NActions& n_actions, ActionMask mask = {},
-                           bool lacks_order = false) {
+  Choice choose(Episode& episode, const NActions& n_actions, ActionMask mask = {},
+                bool lacks_order = false, bool may_leave = false) {
     ActionMask left = mask;
     for (std::size_t d = 0; d < episode.kept.size() && !left.empty(); ++d) {
-      if (!allows(take_part(left, n_actions(d)), episode.kept[d])) episode.n_kept = 0;
+      const bool is_allowed = allows(take_part(left, n_actions(d)), episode.kept[d]);
+      if (!is_allowed && !episode.is_excursion) episode.n_kept = 0;
     }
     const int step = episode.step++;
     const bool at_random = n_random_left_ > 0 && (start_steps_ > 0 || policy_.may_explore(step));
     if (at_random) --n_random_left_;
     const bool must_explore = at_random || (lacks_order && policy_.may_explore(step));
-    if (episode.n_kept == 0 && !must_explore && !policy_.explores(step)) return false;
+    if (episode.n_kept == 0 && !must_explore && !policy_.explores(step)) return Choice::best;
     if (episode.n_kept > 0) {
       --episode.n_kept;
-      return true;
+      return episode.is_excursion ? Choice::worst : Choice::random;
+    }
+    episode.is_excursion = may_leave && !must_explore && step >= kLongEpisode &&
+                           repetitions_.below(kDrawsForExcursion) == 0;
+    if (episode.is_excursion) {
+      episode.n_kept = static_cast<int>(repetitions_.below(static_cast<std::uint64_t>(longest())));
+      return Choice::worst;
     }
     for (std::size_t d = 0; d < episode.kept.size(); ++d) {
       const std::size_t n = n_actions(d);
@@ -111,7 +125,7 @@ class Exploration {
       const double most = longest();
       episode.n_kept = static_cast<int>(std::min(1.0 / drawn, most)) - 1;
     }
-    return true;
+    return Choice::random;
   }
 
   template <class Self, class Archive>
@@ -140,6 +154,9 @@ class Exploration {
     std::vector<std::int64_t> kept(episode.kept.begin(), episode.kept.end());
     archive.numbers("kept_action", kept);
     archive.number("n_kept", episode.n_kept);
+    std::optional<bool> is_excursion;  // absent otherwise
+    if (episode.is_excursion) is_excursion = true;
+    archive.number("is_excursion", is_excursion);
     if constexpr (Archive::kReads) {
       archive.expect(kept.size() == episode.kept.size(), "kept_action", "one per dimension");
       for (std::size_t d = 0; d < kept.size(); ++d) {
@@ -147,6 +164,7 @@ class Exploration {
                        "kept_action", "an action");
         episode.kept[d] = static_cast<std::size_t>(kept[d]);
       }
+      episode.is_excursion = is_excursion.value_or(false);
       archive.expect(episode.step >= 0, "step", "0 or more");
       archive.expect(episode.n_kept >= 0 && episode.n_kept < max_action_repeat_, "n_kept",
                      "in [0, max_action_repeat)");
@@ -155,6 +173,8 @@ class Exploration {
 
  private:
   static constexpr int kShort = 5;
+  static constexpr int kLongEpisode = 2000;
+  static constexpr std::uint64_t kDrawsForExcursion = 4;
   static constexpr int kMostEnded = 20;  // beyond any max_action_repeat
 
   /// Whether an agent searches for first rewards; see QLambda.
@@ -187,7 +207,10 @@ inline constexpr double kLargestReward = 1e300;
 /// - read(state, workspace): reads a state for greedy actions;
 /// - best_of_read(workspace, ties, mask): a best action in the state that was read last.
 /// An epsilon-greedy agent has `exploration_`, a member `exploration` in each episode, and
-/// - read_to_explore(state, episode): reads a state into workspace_ for exploring actions.
+/// - read_to_explore(state, episode): reads a state into workspace_ for exploring actions;
+/// - worst_of_read(workspace, mask), lacks_rewards() and may_leave(), if it searches and leaves
+/// good
+///   states.
 /// Any other agent hides epsilon, explore and evaluation_ties.
 template <class Agent>
 class IndexAgent : public WithRates<Agent> {
@@ -247,13 +270,19 @@ class IndexAgent : public WithRates<Agent> {
   /// Returns the action of act in a step of learning.
   Action explore(std::span<const double> state, auto& episode, ActionMask mask) {
     Agent& own = agent();
-    bool lacks_order = false;
-    if constexpr (requires { own.lacks_rewards(); }) lacks_order = own.lacks_rewards();
-    if (own.exploration_.takes_random_action(episode.exploration, n_actions_of(), mask,
-                                             lacks_order)) {
-      return episode.exploration.kept;
+    Exploration& exploration = own.exploration_;
+    auto choice = Exploration::Choice::best;
+    if constexpr (requires { own.worst_of_read(own.workspace_, mask); }) {
+      choice = exploration.choose(episode.exploration, n_actions_of(), mask, own.lacks_rewards(),
+                                  own.may_leave());
+    } else {
+      choice = exploration.choose(episode.exploration, n_actions_of(), mask);
     }
+    if (choice == Exploration::Choice::random) return episode.exploration.kept;
     own.read_to_explore(state, episode);
+    if constexpr (requires { own.worst_of_read(own.workspace_, mask); }) {
+      if (choice == Exploration::Choice::worst) return own.worst_of_read(own.workspace_, mask);
+    }
     return own.best_of_read(own.workspace_, own.exploration_.policy().ties(true), mask);
   }
   /// The function that gives the number of actions of a dimension.

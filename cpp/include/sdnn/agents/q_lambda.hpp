@@ -259,6 +259,12 @@ class QLambda : public IndexAgent<QLambda> {
     const bool may_search = config_.max_action_repeat > 1 && epsilon() > 0.0;
     return may_search && n_learned_ > 0 && !readout().exponent() && !has_symbols_only();
   }
+  /// Whether long episodes have excursions. With Sarsa they would be a part of the policy that is
+  /// valued, and with discrete states only they would never become rare.
+  bool may_leave() const noexcept {
+    return config_.max_action_repeat > 1 && config_.bootstrap == Bootstrap::q_learning &&
+           !has_symbols_only();
+  }
   bool has_symbols_only() const noexcept {
     const std::vector<int>& n_symbols = readout().config().n_symbols;
     return !n_symbols.empty() && std::ranges::find(n_symbols, 0) == n_symbols.end();
@@ -328,6 +334,18 @@ class QLambda : public IndexAgent<QLambda> {
     for (std::size_t d = 0; d < workspace.action.size(); ++d) {
       const std::span<const double> row = workspace.values[d];
       workspace.action[d] = policy.best_action(row, best_value(row) - whole, ties);
+    }
+    return workspace.action;
+  }
+
+  /// Returns the allowed action of the lowest value in the state that was read last, the first of
+  /// several.
+  Action worst_of_read(Workspace& workspace, ActionMask mask) const {
+    for (std::size_t d = 0; d < workspace.action.size(); ++d) {
+      std::vector<double>& row = workspace.values[d];
+      for (double& value : row) value = -value;
+      exclude(take_part(mask, row.size()), row);
+      workspace.action[d] = static_cast<std::size_t>(std::ranges::max_element(row) - row.begin());
     }
     return workspace.action;
   }
