@@ -161,6 +161,7 @@ static inline void sdnn_finish_at_end(sdnn_agent* agent) {
 static inline void sdnn_begin_episode(sdnn_agent* agent) {
   agent->step = 0;
   agent->n_kept = 0;
+  agent->is_excursion = 0;
   sdnn_forget(&agent->states);
   if (agent->is_pending) sdnn_finish_at_end(agent);
 }
@@ -189,6 +190,7 @@ static inline int sdnn_kind_of_action(sdnn_agent* agent) {
   const int is_left = agent->n_random_left > 0 && (SDNN_START_STEPS > 0 || may_explore);
   const int at_random = is_left || (sdnn_lacks_rewards(agent) && may_explore);
   uint32_t d;
+  if (agent->n_kept == 0) agent->is_excursion = 0;
   if (is_left) --agent->n_random_left;
   if (agent->n_kept > 0) {
     --agent->n_kept;
@@ -260,7 +262,7 @@ static inline void sdnn_act_in_each(sdnn_agent* agent, const int32_t* observatio
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
     sdnn_sums(agent->weights, code, d, sums);
     if (choice == SDNN_WORST) {
-      action[d] = sdnn_smallest_of(sums, sdnn_n_actions[d]);
+      action[d] = agent->kept[d] = sdnn_smallest_of(sums, sdnn_n_actions[d]);
       continue;
     }
     least = sdnn_largest(sums, sdnn_n_actions[d]) - sdnn_tie_tolerance(agent->exponent);
@@ -296,6 +298,22 @@ static inline int64_t sdnn_q_of_each(const sdnn_agent* agent, const int32_t* obs
   return sdnn_sum(agent->weights, &code, limited);
 }
 
+/* Whether a transition is of the last step, which was one of an excursion. */
+static inline int sdnn_is_of_excursion(const sdnn_agent* agent, const uint32_t* action) {
+  uint32_t d;
+  if (!SDNN_MAKES_EXCURSIONS || !agent->is_excursion) return 0;
+  for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
+    if (action[d] != agent->kept[d]) return 0;
+  }
+  return 1;
+}
+
+/* Makes the unit of values smaller at the end of a window of rewards, if it may be. */
+static inline void sdnn_end_step(sdnn_agent* agent) {
+  const int32_t size = sdnn_end_window(&agent->scale);
+  if (size != INT32_MIN) sdnn_refine_unit(agent, size);
+}
+
 /* Learns a transition, whose reward is times 2^SDNN_FRACTION_BITS. `terminated` says that nothing
  * follows it; running out of time is no such end. If the next transition begins elsewhere, this one
  * was the last of its episode. */
@@ -304,7 +322,6 @@ static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observat
                                       const int32_t* next_observation, int terminated) {
   uint32_t bins[SDNN_N_INPUTS], limited[SDNN_N_DIMENSIONS], d, is_next;
   const sdnn_code* code;
-  int32_t size;
   int is_accepted;
   if (SDNN_IS_REFUSED(int32_t, observation) || SDNN_IS_REFUSED(int32_t, next_observation)) return;
   is_accepted = sdnn_accepts(&agent->scale, reward);
@@ -313,6 +330,13 @@ static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observat
   is_next = sdnn_read_first(&agent->states, observation, bins);
   if (!is_accepted) {
     sdnn_read_next(&agent->states, limited, next_observation, bins);
+    return;
+  }
+  if (!terminated && sdnn_is_of_excursion(agent, limited)) {
+    sdnn_end(agent);
+    sdnn_read_next(&agent->states, limited, next_observation, agent->states.next_bins);
+    sdnn_keep_next(&agent->states, next_observation);
+    sdnn_end_step(agent);
     return;
   }
   if (agent->is_pending && !is_next) sdnn_finish_at_end(agent);
@@ -348,8 +372,7 @@ static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observat
   } else if (!SDNN_IS_SARSA) {
     sdnn_correct_by_best(agent);
   }
-  size = sdnn_end_window(&agent->scale);
-  if (size != INT32_MIN) sdnn_refine_unit(agent, size);
+  sdnn_end_step(agent);
 }
 
 #if SDNN_N_DIMENSIONS == 1

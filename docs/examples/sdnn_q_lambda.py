@@ -146,6 +146,7 @@ class QLambda:
             must_explore = self.n_random_left > 0 or self.lacks_rewards()
             self.n_random_left = max(self.n_random_left - 1, 0)
             self.n_steps += 1
+            self.is_excursion &= self.n_kept > 0
             if self.n_kept > 0:
                 self.n_kept -= 1
                 return self.worst(state) if self.is_excursion else self.random_action
@@ -154,7 +155,7 @@ class QLambda:
                 #     episode that terminates halves the longest duration, down to 5 steps.
                 longest = max(s.max_action_repeat >> self.n_terminated, min(5, s.max_action_repeat))
                 # (8) In endless episodes a fourth of these draws begins an excursion from good
-                #     states: its steps take the worst action.
+                #     states: its steps take the worst action, and are not learned.
                 is_long = self.n_steps > 2000 and s.max_action_repeat > 1 and not must_explore
                 self.is_excursion = is_long and self.repetitions.below(4) == 0
                 if self.is_excursion:
@@ -174,9 +175,14 @@ class QLambda:
         return [int(tied[ties.below(len(tied)) if len(tied) > 1 else 0]) for tied in best]
 
     def worst(self, state):
-        return [int(part.argmin()) for part in self.sums(self.code(state), self.weights)]
+        parts = self.sums(self.code(state), self.weights)
+        self.random_action = [int(part.argmin()) for part in parts]
+        return self.random_action
 
     def learn(self, state, action, reward, next_state, terminated):
+        if self.is_excursion and list(action) == self.random_action and not terminated:
+            self.end_trace()
+            return
         x, next_x = self.code(state), self.code(next_state)
         if self.next_state is not None:
             # Watkins: a worse action ends the trace, as does a state that does not follow.

@@ -36,7 +36,9 @@ namespace sdnn::agents {
 ///
 /// In an episode without an end an agent would stay in good states and learn little of all others.
 /// After kLongEpisode steps of an episode, every fourth of the draws above begins an excursion
-/// instead, of a uniform length up to the longest at present: its steps take the worst action.
+/// instead, of a uniform length up to the longest at present: its steps take the worst action, and
+/// are not learned unless they terminate. (Learned, they raise the values of all actions: errors of
+/// the best values are corrected only where best actions are taken.)
 ///
 /// In its first start_steps steps an agent takes random actions only, so that it finds a rare
 /// success before greedy actions have learned to avoid effort. Source: the start_steps of Achiam,
@@ -47,14 +49,15 @@ class Exploration {
 
   /// The state of the present episode in one environment.
   struct Episode {
-    std::vector<std::size_t> kept;  ///< the random action
+    std::vector<std::size_t> kept;  ///< the random action, or the last one of the excursion
     int n_kept = 0;                 ///< steps that it, or the excursion, will still last
-    bool is_excursion = false;
+    bool is_excursion = false;      ///< whether the last action was one of an excursion
     int step = 0;
 
     void begin() noexcept {
       step = 0;
       n_kept = 0;
+      is_excursion = false;
     }
   };
 
@@ -91,6 +94,7 @@ class Exploration {
   template <class NActions>
   Choice choose(Episode& episode, const NActions& n_actions, ActionMask mask = {},
                 bool lacks_order = false, bool may_leave = false) {
+    if (episode.n_kept == 0) episode.is_excursion = false;
     ActionMask left = mask;
     for (std::size_t d = 0; d < episode.kept.size() && !left.empty(); ++d) {
       const bool is_allowed = allows(take_part(left, n_actions(d)), episode.kept[d]);
@@ -281,7 +285,11 @@ class IndexAgent : public WithRates<Agent> {
     if (choice == Exploration::Choice::random) return episode.exploration.kept;
     own.read_to_explore(state, episode);
     if constexpr (requires { own.worst_of_read(own.workspace_, mask); }) {
-      if (choice == Exploration::Choice::worst) return own.worst_of_read(own.workspace_, mask);
+      if (choice == Exploration::Choice::worst) {
+        const Action worst = own.worst_of_read(own.workspace_, mask);
+        std::ranges::copy(worst, episode.exploration.kept.begin());
+        return worst;
+      }
     }
     return own.best_of_read(own.workspace_, own.exploration_.policy().ties(true), mask);
   }

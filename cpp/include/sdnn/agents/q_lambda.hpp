@@ -131,7 +131,8 @@ class QLambda : public IndexAgent<QLambda> {
   }
 
   /// Learns one transition of dt usual steps; with Sarsa it is pending until the next action is
-  /// known, unless it terminated. `next_mask` restricts the actions of the next state. Throws
+  /// known, unless it terminated. Steps of excursions are not learned, see Exploration. `next_mask`
+  /// restricts the actions of the next state. Throws
   /// std::invalid_argument for a reward that is not finite or beyond +- 1e300, an impossible dt, or
   /// an environment that does not exist; then nothing has been learned.
   void learn(std::span<const double> state, Action action, double reward,
@@ -140,6 +141,10 @@ class QLambda : public IndexAgent<QLambda> {
     require_transition(state, action, reward, next_state, next_mask);
     require_duration(dt);
     Episode& episode = episodes_.of(environment);
+    if (!terminated && is_of_excursion(episode, action)) {
+      end(episode);
+      return;
+    }
     if (episode.waits && !std::ranges::equal(episode.next_state, state)) finish_at_end(episode);
     readout().read_next(state, episode.next);
     if (episode.waits) finish(episode, action);
@@ -336,6 +341,11 @@ class QLambda : public IndexAgent<QLambda> {
       workspace.action[d] = policy.best_action(row, best_value(row) - whole, ties);
     }
     return workspace.action;
+  }
+
+  static bool is_of_excursion(const Episode& episode, Action action) {
+    const Exploration::Episode& exploration = episode.exploration;
+    return exploration.is_excursion && std::ranges::equal(action, exploration.kept);
   }
 
   /// Returns the allowed action of the lowest value in the state that was read last, the first of
