@@ -5,7 +5,8 @@
 In turn, a hundred rounds or so each: a training, the environment alone with random actions, and the
 calls of the core that act and learn, minus such calls for no environment. Of each the quickest
 twentieth counts: other work on the machine can only add to it. "beside" is the training minus the
-environment, "ratio" the training against environment and core together.
+environment, "of it" that against the environment, and "ratio" the training against environment and
+core together.
 """
 
 from __future__ import annotations
@@ -24,7 +25,9 @@ import sdnn.environments  # noqa: F401  (registers the acrobot)
 from sdnn.agents import SDNNQLambda, SDNNQLearning, Training
 
 AGENTS = {kind.kind: kind for kind in (SDNNQLambda, SDNNQLearning)}
-HEADER = ("task", "agent", "environments", "training", "environment", "core", "beside", "ratio")
+HEADER = (
+    "task", "agent", "environments", "training", "environment", "core", "beside", "of it", "ratio",
+)  # fmt: skip
 SECONDS = 2e-3
 ROUNDS = 100
 PERCENT = 5
@@ -80,7 +83,7 @@ def core_slices(
 
     It returns the microseconds of a step, of which there are n in each round.
     """
-    core, read, elements, _ = learner.core_parts()
+    core, read, batch, _ = learner.core_parts()
     core.n_environments = n_envs
     env = gym.make_vec(task, num_envs=n_envs, vectorization_mode="sync")
     latest = read("observation", env.reset(seed=0)[0])
@@ -89,17 +92,19 @@ def core_slices(
     def rounds() -> Iterator[tuple[Any, ...]]:
         nonlocal latest
         for _ in range(ROUNDS):
-            before, numbers = latest, core.act_each(latest, every)
-            seen, rewards, terminated, _, _ = env.step(elements(numbers))
-            latest = read("next_observation", seen)
-            yield before, numbers, rewards.tolist(), latest, terminated.tolist()
+            before, actions = latest, batch([None] * n_envs)
+            core.act_each(latest, every, actions)
+            observations, rewards, terminated, _, _ = env.step(actions)
+            latest = read("next_observation", observations)
+            ends = terminated.tolist()
+            yield before, actions, rewards.tolist(), latest, ends, [False] * n_envs
 
     def take() -> float:
         steps = list(rounds())
         began = time.thread_time()
         for step in steps:
-            core.act_each(step[0], environments)
-            core.learn_each(*step, environments, [])
+            core.act_each(step[0], environments, step[1])
+            core.learn_each(*step, environments, n_envs, 0, None)
         return (time.thread_time() - began) * 1e6 / (ROUNDS * n_envs)
 
     return take
@@ -131,7 +136,8 @@ def main() -> None:
         trained, alone, core, calls = np.percentile(times, PERCENT, axis=0)
         core -= calls
         cells = (f"{us:.1f}" for us in (trained, alone, core, trained - alone))
-        rows.append((task, agent, str(n_envs), *cells, f"{trained / (alone + core):.2f}"))
+        ratios = (f"{x:.2f}" for x in (trained / alone - 1, trained / (alone + core)))
+        rows.append((task, agent, str(n_envs), *cells, *ratios))
     print(markdown(HEADER, rows))
 
 

@@ -19,9 +19,29 @@
 
 namespace sdnn::bindings {
 
-/// An argument that becomes a C-contiguous array of `T`, converted if need be.
+/// An argument that becomes a C-contiguous array of `T`, converted if need be. Unlike pybind11's
+/// array_t, it makes no empty array before it is loaded.
 template <class T>
-using ArrayArgument = pybind11::array_t<T, pybind11::array::c_style | pybind11::array::forcecast>;
+class ArrayArgument
+    : public pybind11::array_t<T, pybind11::array::c_style | pybind11::array::forcecast> {
+ public:
+  using Base = pybind11::array_t<T, pybind11::array::c_style | pybind11::array::forcecast>;
+
+  ArrayArgument() : Base(pybind11::handle(), typename Base::stolen_t()) {}
+
+  /// Takes an array of `T` as it is, or converts; false without an error if that is impossible.
+  bool load(pybind11::handle source, bool convert) {
+    const bool fits = Base::check_(source);
+    if (!fits && !convert) return false;
+    auto& self = static_cast<pybind11::object&>(*this);
+    if (fits) {
+      self = pybind11::reinterpret_borrow<pybind11::object>(source);
+    } else {
+      self = Base::ensure(source);
+    }
+    return static_cast<bool>(self);
+  }
+};
 
 /// The items of an array, whatever its shape.
 template <class T>
@@ -117,3 +137,15 @@ inline std::vector<coding::InputPair> pairs_of(const ArrayArgument<std::int32_t>
 }
 
 }  // namespace sdnn::bindings
+
+namespace pybind11::detail {
+
+template <class T>
+struct pyobject_caster<sdnn::bindings::ArrayArgument<T>> {
+  PYBIND11_TYPE_CASTER(sdnn::bindings::ArrayArgument<T>,
+                       handle_type_name<typename sdnn::bindings::ArrayArgument<T>::Base>::name);
+  bool load(handle source, bool convert) { return value.load(source, convert); }
+  static handle cast(const handle& array, return_value_policy, handle) { return array.inc_ref(); }
+};
+
+}  // namespace pybind11::detail

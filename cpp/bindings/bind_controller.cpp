@@ -8,10 +8,12 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
 
+#include "action_rows.hpp"
 #include "agents.hpp"
 #include "arrays.hpp"
 #include "bind_config.hpp"
@@ -120,29 +122,35 @@ std::span<const double> row(const ArrayArgument<double>& rows, const char* name,
   return numbers.subspan(n_columns * i, n_columns);
 }
 
+/// Learns in environments in order: at most `most`, and up to the end of an episode. After each but
+/// that last one, the progress is set to that of `goal` steps, if there is one; `n_steps` were
+/// learned before. Returns how many were learned: all before the first that cannot be.
 std::size_t learn_each(Controller& controller, const ArrayArgument<double>& observations,
-                       const ArrayArgument<double>& actions, const py::list& rewards,
+                       const py::object& actions, const py::list& rewards,
                        const ArrayArgument<double>& next_observations, const py::list& terminated,
-                       const py::list& environments, const py::list& progress,
+                       const py::list& truncated, const py::list& environments, std::size_t most,
+                       std::size_t n_steps, std::optional<double> goal,
                        const MaskArgument& next_masks, const std::optional<py::list>& dts) {
   bindings::wait_for_readers(controller);
   const std::size_t n = controller.n_variables();
+  const std::size_t n_environments = std::min(
+      {rewards.size(), terminated.size(), truncated.size(), dts ? dts->size() : rewards.size()});
+  const bindings::ActionRows rows(actions, controller.n_dimensions());
+  std::vector<double> action;
   std::size_t n_learned = 0;
-  for (const py::handle environment : environments) {
-    const auto i = environment.cast<std::size_t>();
-    core::require(i < std::min(rewards.size(), terminated.size()), "environments",
-                  "those of rewards and terminated", i);
-    core::require(!dts || i < dts->size(), "dts", "a number for each environment", i);
+  bool is_over = false;
+  while (n_learned < std::min(most, environments.size()) && !is_over) {
+    const auto i = environments[n_learned].cast<std::size_t>();
+    core::require(i < n_environments, "environments", "those of rewards and ends", i);
     const auto reward = rewards[i].cast<double>();
     const auto ends = terminated[i].cast<bool>();
-    if (n_learned > 0 && n_learned <= progress.size()) {
-      controller.set_progress(progress[n_learned - 1].cast<double>());
-    }
+    const double dt = dts ? (*dts)[i].cast<double>() : 1.0;
+    is_over = ends || truncated[i].cast<bool>();
+    rows.read(i, action);
     try {
-      controller.learn(row(observations, "observations", n, i),
-                       row(actions, "actions", controller.n_dimensions(), i), reward,
+      controller.learn(row(observations, "observations", n, i), action, reward,
                        row(next_observations, "next_observations", n, i), ends, i,
-                       mask_of(next_masks, "next_masks", i), dts ? (*dts)[i].cast<double>() : 1.0);
+                       mask_of(next_masks, "next_masks", i), dt);
     } catch (const std::logic_error&) {
       if (n_learned == 0) throw;
       break;
@@ -151,8 +159,38 @@ std::size_t learn_each(Controller& controller, const ArrayArgument<double>& obse
       break;
     }
     ++n_learned;
+    if (goal && !is_over) {
+      controller.set_progress(static_cast<double>(n_steps + n_learned) / *goal);
+    }
   }
   return n_learned;
+}
+
+/// Copies observations of several environments, of `shape` each, to rows of float64; None where
+/// they are no such array of numbers.
+std::optional<py::array_t<double>> observation_rows(const py::object& observations,
+                                                    const py::tuple& shape) {
+  if (!py::isinstance<py::array>(observations)) return std::nullopt;
+  const auto array = py::reinterpret_borrow<py::array>(observations);
+  if (array.ndim() != static_cast<py::ssize_t>(shape.size()) + 1) return std::nullopt;
+  py::ssize_t n_variables = 1;
+  for (std::size_t k = 0; k < shape.size(); ++k) {
+    if (array.shape(static_cast<py::ssize_t>(k) + 1) != shape[k].cast<py::ssize_t>()) {
+      return std::nullopt;
+    }
+    n_variables *= shape[k].cast<py::ssize_t>();
+  }
+  const py::dtype type = array.dtype();
+  if (std::string_view("fiub").find(type.kind()) == std::string_view::npos) return std::nullopt;
+  py::array_t<double> rows({array.shape(0), n_variables});
+  const bool is_float = type.num() == py::dtype::num_of<float>() && type.byteorder() == '=';
+  if (is_float && (array.flags() & py::array::c_style) != 0) {
+    std::copy_n(static_cast<const float*>(array.data()), rows.size(), rows.mutable_data());
+  } else {
+    const ArrayArgument<double>::Base numbers(observations);
+    std::copy_n(numbers.data(), rows.size(), rows.mutable_data());
+  }
+  return rows;
 }
 
 /// Binds a member function that takes a transition.
@@ -277,30 +315,27 @@ void bind_controller(py::module_& module) {
       .def(
           "act_each",
           [](Controller& self, const ArrayArgument<double>& observations,
-             const py::list& environments, const MaskArgument& masks) {
-            const std::size_t n = self.n_dimensions();
-            const auto n_rows = static_cast<std::size_t>(observations.shape(0));
-            return bindings::filled<double>({n_rows, n}, [&](auto actions) {
-              std::ranges::fill(actions, 0.0);
-              for (const py::handle environment : environments) {
-                const auto i = environment.cast<std::size_t>();
-                const auto action =
-                    self.act(row(observations, "observations", self.n_variables(), i), true, i,
-                             mask_of(masks, "masks", i));
-                std::ranges::copy(action, actions.begin() + static_cast<std::ptrdiff_t>(n * i));
-              }
-            });
+             const py::list& environments, const py::object& actions, const MaskArgument& masks) {
+            bindings::ActionRows rows(actions, self.n_dimensions());
+            for (const py::handle environment : environments) {
+              const auto i = environment.cast<std::size_t>();
+              rows.write(i, self.act(row(observations, "observations", self.n_variables(), i), true,
+                                     i, mask_of(masks, "masks", i)));
+            }
           },
-          py::arg("observations"), py::arg("environments"), py::arg("masks") = py::none(),
-          "Exploring actions in some environments, in order; other rows are zeros")
+          py::arg("observations"), py::arg("environments"), py::arg("actions"),
+          py::arg("masks") = py::none(),
+          "Writes exploring actions in some environments, in order, to their rows of `actions`")
       .def(
           "learn_each", &learn_each, py::arg("observations"), py::arg("actions"),
           py::arg("rewards"), py::arg("next_observations"), py::arg("terminated"),
-          py::arg("environments"), py::arg("progress"), py::arg("next_masks") = py::none(),
-          py::arg("dts") = py::none(),
-          "Learns in some environments, in order; `progress` is set between two, if given. Returns "
-          "how many were learned: all before the first that cannot be, whose error is raised where "
-          "it comes first")
+          py::arg("truncated"), py::arg("environments"), py::arg("most"), py::arg("n_steps"),
+          py::arg("goal"), py::arg("next_masks") = py::none(), py::arg("dts") = py::none(),
+          "Learns in environments in order: at most `most`, up to the end of an episode. After "
+          "each "
+          "but that last one, the progress becomes that of `goal` steps, if given, of which "
+          "`n_steps` were learned before. Returns how many were learned: all before the first that "
+          "cannot be, whose error is raised where it comes first")
       .def("values", &values, py::arg("observation"), py::arg("dimension") = 0,
            "Q of all actions of a dimension, as greedy actions follow it; of fuzzy rules the value "
            "of the observation alone, of an actor-critic the probabilities of the actions")
@@ -372,4 +407,8 @@ void bind_controller(py::module_& module) {
           py::arg("observation"), py::arg("action"),
           "Continues an episode with a teacher's action, and learns nothing");
   bindings::def_state(type);
+  module.def(
+      "observation_rows", &observation_rows, py::arg("observations"), py::arg("shape"),
+      "Observations of several environments, of a shape each, as rows of float64; None where "
+      "they are no such array of numbers");
 }

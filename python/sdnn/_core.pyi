@@ -1925,9 +1925,9 @@ class Controller:
         """
     def act(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], explore: bool = True, environment: typing.SupportsInt | typing.SupportsIndex = 0, mask: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None) -> numpy.typing.NDArray[numpy.float64]:
         ...
-    def act_each(self, observations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], environments: list, masks: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None) -> numpy.typing.NDArray[numpy.float64]:
+    def act_each(self, observations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], environments: list, actions: typing.Any, masks: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None) -> None:
         """
-        Exploring actions in some environments, in order; other rows are zeros
+        Writes exploring actions in some environments, in order, to their rows of `actions`
         """
     def action_of(self, index: typing.SupportsInt | typing.SupportsIndex, dimension: typing.SupportsInt | typing.SupportsIndex) -> float:
         ...
@@ -1955,9 +1955,9 @@ class Controller:
         """
     def learn(self, observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], action: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], reward: typing.SupportsFloat | typing.SupportsIndex, next_observation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: bool, environment: typing.SupportsInt | typing.SupportsIndex = 0, next_mask: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None, dt: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
         ...
-    def learn_each(self, observations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], actions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], rewards: list, next_observations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: list, environments: list, progress: list, next_masks: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None, dts: list | None = None) -> int:
+    def learn_each(self, observations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], actions: typing.Any, rewards: list, next_observations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], terminated: list, truncated: list, environments: list, most: typing.SupportsInt | typing.SupportsIndex, n_steps: typing.SupportsInt | typing.SupportsIndex, goal: typing.SupportsFloat | typing.SupportsIndex | None, next_masks: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8] | None = None, dts: list | None = None) -> int:
         """
-        Learns in some environments, in order; `progress` is set between two, if given. Returns how many were learned: all before the first that cannot be, whose error is raised where it comes first
+        Learns in environments in order: at most `most`, up to the end of an episode. After each but that last one, the progress becomes that of `goal` steps, if given, of which `n_steps` were learned before. Returns how many were learned: all before the first that cannot be, whose error is raised where it comes first
         """
     def range_use(self) -> list[tuple[float, float] | None]:
         """
@@ -2284,6 +2284,10 @@ def n_units_for(scheme: str, n_classes: typing.SupportsInt | typing.SupportsInde
     """
 def normal_quantile(p: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     ...
+def observation_rows(observations: typing.Any, shape: tuple) -> numpy.typing.NDArray[numpy.float64] | None:
+    """
+    Observations of several environments, of a shape each, as rows of float64; None where they are no such array of numbers
+    """
 def power(base: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], exponent: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     ...
 def presets() -> dict[str, tuple[str, SDNNCConfig, QLearningConfig, ObservationConfig]]:

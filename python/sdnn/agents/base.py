@@ -383,7 +383,7 @@ class BaseAgent(Advised, abc.ABC, Generic[Approximator, Learning]):
         if functions != [BaseAgent.act, BaseAgent.learn]:
             return None
         return CoreParts(
-            self._controller, self._observations.rows, actions.elements, actions.learned_mask
+            self._controller, self._observations.rows, actions.batch, actions.learned_mask
         )
 
     @property

@@ -7,11 +7,12 @@ from typing import Any, Literal, TypeAlias
 
 import gymnasium as gym
 import numpy as np
+from numpy import ndarray
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
 from sdnn.environments.space_kinds import flat_bounds, in_a_line, wholes_of, with_infinities
-from sdnn.environments.types import Array, Element, Space
+from sdnn.environments.types import Array, Element, Elements, Space
 from sdnn.support.arguments import argument_error, array_of, blamed, require, shown
 
 Inputs: TypeAlias = Literal["all", "relevant"] | Sequence[int]
@@ -115,14 +116,12 @@ class Observations:
 
     def rows(self, name: str, observations: Any) -> NDArray[np.float64]:
         """Copy several observations, (n, n_variables); ValueError if one of them does not fit."""
-        is_array = type(observations) is np.ndarray and observations.dtype.kind in "fiub"
-        if is_array and observations.shape[1:] == self._shape:
-            rows: NDArray[np.float64] = observations.astype(np.float64)
-        else:
-            rows = np.array(
-                [self.vector(name, observation) for observation in observations], np.float64
-            )
-        return rows if rows.ndim == 2 else rows.reshape(-1, self.n_variables)
+        if type(observations) is ndarray and self._shape is not None:
+            rows = _core.observation_rows(observations, self._shape)
+            if rows is not None:
+                return rows
+        vectors = [self.vector(name, observation) for observation in observations]
+        return np.array(vectors, np.float64).reshape(-1, self.n_variables)
 
 
 def has_mask(space: Space, observation: Element) -> bool:
@@ -277,7 +276,7 @@ class Actions:
             raise argument_error("action_space", f"{problem}: {remedy}")
         dtype = np.dtype(space.dtype)
         self._dtype = dtype
-        self._rows = (-1, *(space.shape or ()))
+        self._shape = space.shape or ()
         number: Any = {"f2": "float16", "f4": "float32"}.get(dtype.str[1:], "float64")
         self.config = _core.ActionConfig(
             low=low.astype(np.float64).tolist(),
@@ -288,11 +287,18 @@ class Actions:
 
     def elements(self, numbers: NDArray[np.float64]) -> Array:
         """Make an element of the space from each row of numbers."""
-        return numbers.astype(self._dtype).reshape(self._rows)
+        return numbers.astype(self._dtype).reshape((-1, *self._shape))
+
+    def batch(self, elements: Elements) -> Array:
+        """Make an array of elements of the space, with zeros for None."""
+        actions = np.zeros((len(elements), *self._shape), self._dtype)
+        for i, element in enumerate(elements):
+            actions[i] = 0 if element is None else element
+        return actions
 
     def hold(self, rows: Array) -> bool:
         """Return whether all rows of an array are elements of the space."""
-        if rows.ndim == 0 or rows.shape[1:] != self._rows[1:]:
+        if rows.ndim == 0 or rows.shape[1:] != self._shape:
             return False
         is_alike = rows.dtype.kind == self._dtype.kind or np.can_cast(rows.dtype, self._dtype)
         values = rows.reshape(len(rows), len(self.config.low))

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy import ndarray
 
 from sdnn.environments.types import AnyEnv, Data, Element, Elements, Env, Info, Mask, Masks
 from sdnn.support.arguments import duration_of, flag, reward_of, shown
@@ -104,13 +105,13 @@ def reset_env(env: AnyEnv, seed: Any, options: Options) -> tuple[Element, Info]:
 def step_env(env: AnyEnv, action: Element) -> Sequence[Any]:
     """Step an environment, or a vector; UnusableStepError if it does not return five values."""
     made = env.step(action)
-    if not (isinstance(made, (tuple, list)) and len(made) == 5):
-        n = len(made) if isinstance(made, (tuple, list)) else 1
-        raise UnusableStepError(
-            "env.step must return five values, (observation, reward, terminated, truncated, info),"
-            f" got {n}{_OLD_API}"
-        )
-    return made
+    if (type(made) is tuple or isinstance(made, (tuple, list))) and len(made) == 5:
+        return made
+    n = len(made) if isinstance(made, (tuple, list)) else 1
+    raise UnusableStepError(
+        "env.step must return five values, (observation, reward, terminated, truncated, info),"
+        f" got {n}{_OLD_API}"
+    )
 
 
 def checked_outcome(reward: Any, terminated: object, truncated: object) -> tuple[float, bool, bool]:
@@ -129,7 +130,7 @@ def checked_outcome(reward: Any, terminated: object, truncated: object) -> tuple
 
 def copied(value: Element) -> Element:
     """Copy an observation or action that an environment or agent may change later."""
-    if type(value) is np.ndarray:
+    if type(value) is ndarray:
         return value.copy()
     return value if isinstance(value, _SCALARS) else copy.deepcopy(value)
 
@@ -156,7 +157,9 @@ class SingleEnvironment(EnvironmentAdapter):
     def take(self, action: Element) -> tuple[Element, float, bool, bool]:
         """Step the environment; return observation, reward, terminated and truncated."""
         observation, reward, terminated, truncated, info = step_env(self._env, copied(action))
-        reward, terminated, truncated = checked_outcome(reward, terminated, truncated)
+        is_usual = type(reward) is float and type(terminated) is bool is type(truncated)
+        if not (is_usual and math.isfinite(reward)):
+            reward, terminated, truncated = checked_outcome(reward, terminated, truncated)
         if self.masks is not None:
             self.masks = [None if terminated else mask_in(info)]
         if self.dts is not None:
@@ -166,7 +169,7 @@ class SingleEnvironment(EnvironmentAdapter):
     def step(self, actions: Elements) -> Elements:
         """Step the environment with the action of environment 0, and return a batch of one."""
         observation, self.rewards[0], self.terminated[0], self.truncated[0] = self.take(actions[0])
-        return observation[np.newaxis] if type(observation) is np.ndarray else [observation]
+        return observation[None] if type(observation) is ndarray else [observation]
 
 
 def episode_seed(seed: int, kind: int, episode: int) -> int:
@@ -212,7 +215,6 @@ class Episodes:
 
     observations: Elements
     previous_observations: Elements
-    masks: Masks | None = None
 
     def __init__(
         self,
@@ -234,6 +236,7 @@ class Episodes:
         self.present: list[Episode | None] = [None] * n
         self.unlearned: list[int] = []
         self.actions: Elements = [None] * n
+        self.masks: Masks | None = None
         self._environments = list(range(n))
         self._begins_with_step: dict[int, int] = {}
 
@@ -247,6 +250,7 @@ class Episodes:
         self.adapter = type(self.adapter)(self._env)
         self.present[:] = [None] * self.n_environments
         self.unlearned = []
+        self._begins_with_step = {}
 
     def begin(self) -> None:
         """Begin episodes where none is present.
@@ -255,7 +259,6 @@ class Episodes:
         """
         present = self.present
         self.unlearned = self._environments.copy()
-        self._begins_with_step = {}
         if None not in present:
             return
         over = [i for i, episode in enumerate(present) if episode is None]
@@ -274,49 +277,49 @@ class Episodes:
     def step(self, actions: Elements) -> None:
         """Step every environment; begin the episodes that some vectors begin with the step."""
         self.actions, self.previous_observations = actions, self.observations
-        elements = self._learner.elements(actions)
+        has_seeds = self._seed is not None
         for i in self.unlearned:
             episode: Any = self.present[i]
             episode.n_steps += 1
-            if self._seed is not None:
-                episode.actions.append(elements[i])
+            if has_seeds:
+                episode.actions.append(actions[i])
         try:
-            observations = self.adapter.step(elements)
+            observations = self.adapter.step(actions)
             if self.adapter.dts is not None:
                 _require_durations(self.adapter.dts, self.unlearned)
         except UnusableStepError as error:
             raise self._unusable(error, None) from error
         self.observations = self._read("next_observation", observations)
-        for i, number in self._begins_with_step.items():
-            self.present[i] = Episode(number)
-            self._learner.begin_episode(i)
+        if self._begins_with_step:
+            for i, number in self._begins_with_step.items():
+                self.present[i] = Episode(number)
+                self._learner.begin_episode(i)
+            self._begins_with_step = {}
 
     def is_over(self, environment: int) -> bool:
         """Return whether the last step has ended the episode of an environment."""
         adapter = self.adapter
         return adapter.terminated[environment] or adapter.truncated[environment]
 
-    def up_to_episode_end(self, most: int) -> list[int]:
-        """Return the next environments to learn from: at most `most`, up to an episode's end."""
-        adapter, environments = self.adapter, self.unlearned[:most]
-        for k, i in enumerate(environments, 1):
-            if adapter.terminated[i] or adapter.truncated[i]:
-                del environments[k:]
-        return environments
-
     def ended(self) -> list[bool]:
         """Return in which environments the last step has ended the episode."""
         adapter = self.adapter
         return [a or b for a, b in zip(adapter.terminated, adapter.truncated, strict=True)]
 
-    def note_learned(self, environments: list[int]) -> None:
-        """Remove environments from the beginning of `unlearned`; add their rewards."""
-        del self.unlearned[: len(environments)]
+    def note_learned(self, n: int) -> tuple[int, bool]:
+        """Remove n environments from the beginning of `unlearned`; add their rewards.
+
+        Returns the last of them, and whether its episode is over.
+        """
+        environments, rewards = self.unlearned[:n], self.adapter.rewards
+        del self.unlearned[:n]
         for i in environments:
             episode: Any = self.present[i]
-            episode.sum_of_rewards += self.adapter.rewards[i]
+            episode.sum_of_rewards += rewards[i]
             if episode.n_steps == _ENDLESS and not self.is_over(i):
                 warn_of_endless_episode(_ENDLESS)
+        i = environments[-1]
+        return i, self.adapter.terminated[i] or self.adapter.truncated[i]
 
     def _reset(self, numbers: Mapping[int, int]) -> dict[int, Element]:
         """Reset environments for the episodes of these numbers; return the first observations."""
@@ -337,8 +340,9 @@ class Episodes:
 
     def _read(self, name: str, observations: Elements) -> Elements:
         """Read observations and all masks; a ValueError becomes an error that names the step."""
+        read = self._learner.read
         try:
-            rows = self._learner.read(name, observations)
+            rows = read(name, observations)
             if self.adapter.masks is not None:
                 self.masks = self._learner.masks(self.adapter.masks)
         except ValueError as error:

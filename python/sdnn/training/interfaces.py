@@ -113,16 +113,13 @@ class ObservingLearner(Protocol):
     def masks(self, masks: list[Mask]) -> Masks:
         """Return masks of all environments as `act` and `learn` take them; ValueError names one."""
 
-    def elements(self, actions: Elements, /) -> Elements:
-        """Return the elements of the action space that `act` has chosen."""
-
 
 class CoreParts(NamedTuple):
-    """The C++ object of an agent, and the functions that convert to and from its numbers."""
+    """The C++ object of an agent, and the functions that make what it takes."""
 
     core: Controller
     read: Callable[[str, Elements], NDArray[np.float64]]
-    elements: Callable[[NDArray[np.float64]], Array]
+    batch: Callable[[Elements], Array]
     mask: Callable[[str, Mask], NDArray[np.uint8] | None]
 
 

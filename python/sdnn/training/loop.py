@@ -14,6 +14,7 @@ from contextlib import ExitStack
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy import ndarray
 from numpy.typing import NDArray
 
 from sdnn.environments.types import Array, Data, Element, Elements, Info, Mask, Masks
@@ -78,9 +79,6 @@ class _LearnerForAll(ObservingLearner):
             chosen[i] = self._learner.act(observations[i], **self.arguments[i], **mask)
         return chosen
 
-    def elements(self, actions: Elements, /) -> Elements:
-        return actions
-
     def learn(
         self,
         observations: Elements,
@@ -88,14 +86,18 @@ class _LearnerForAll(ObservingLearner):
         rewards: list[float],
         next_observations: Elements,
         terminated: list[bool],
+        truncated: list[bool],
         environments: list[int],
-        progress: list[float],
+        most: int,
+        n_steps: int,
+        goal: int | None,
         next_masks: Masks | None = None,
         dts: list[float] | None = None,
     ) -> int:
         """Learn the last step in the first of these environments; return the number of steps.
 
-        Subclasses may learn in more environments, and set the learner's ``progress`` between two.
+        Then ``progress`` becomes ``n_steps + 1`` of ``goal`` steps, unless an episode has ended.
+        Subclasses may learn in at most ``most`` environments, up to an episode's end.
         """
         i = environments[0]
         reward, terminates, _ = checked_outcome(rewards[i], terminated[i], False)
@@ -105,6 +107,9 @@ class _LearnerForAll(ObservingLearner):
             observations[i], actions[i], reward, next_observations[i], terminates, mask, dt
         )
         self._learner.learn(step, **self.arguments[i])
+        is_over = terminated[i] or truncated[i]
+        if goal is not None and self.progressing is not None and not is_over:
+            self.progressing.progress = (n_steps + 1) / goal
         return 1
 
 
@@ -112,13 +117,12 @@ class _CoreLearnerForAll(_LearnerForAll):
     """Acts and learns in all environments by one call of an agent in C++."""
 
     read: Callable[[str, Elements], NDArray[np.float64]]
-    elements: Callable[[Any], Array]
     learn: Callable[..., int]
 
     def __init__(self, learner: Learner, n_environments: int, parts: CoreParts) -> None:
         super().__init__(learner, n_environments)
         self.progressing = self._core = parts.core
-        self.read, self.elements, self._mask = parts.read, parts.elements, parts.mask
+        self.read, self._batch, self._mask = parts.read, parts.batch, parts.mask
         self.learn = parts.core.learn_each
         self._n_actions = sum(parts.core.n_actions)
 
@@ -138,11 +142,9 @@ class _CoreLearnerForAll(_LearnerForAll):
         actions: Elements,
         environments: list[int],
         masks: Any = None,
-    ) -> NDArray[np.float64]:
-        chosen = self._core.act_each(observations, environments, masks)
-        if len(environments) < len(chosen):
-            for i in set(range(len(chosen))).difference(environments):
-                chosen[i] = np.ravel(actions[i])  # a replay leaves elements of the space, not rows
+    ) -> Array:
+        chosen = actions.copy() if type(actions) is ndarray else self._batch(actions)
+        self._core.act_each(observations, environments, chosen, masks)
         return chosen
 
 
@@ -189,7 +191,7 @@ class TrainingLoop(abc.ABC):
     _episodes: Episodes
     _learner: _LearnerForAll
     _listeners: Sequence[tuple[int, Any]]
-    _stops = False
+    _stops: bool
 
     def pieces(self, seconds: float) -> Generator[None, None, None]:
         """Learn as `run` does, in pieces of about ``seconds`` each.
@@ -239,15 +241,13 @@ class TrainingLoop(abc.ABC):
 
         Returns the environment of the last step learned, whose outcome is to be noted.
         """
-        episodes = self._episodes
+        episodes, monotonic = self._episodes, time.monotonic
         while True:
             while not episodes.unlearned:
                 self._act_and_step()
-            environment = self._learn()
-            is_due = self.n_steps >= self._next_call or self._stops or time.monotonic() >= due
-            if is_due or episodes.is_over(environment):
+            environment, is_over = self._learn()
+            if is_over or self.n_steps >= self._next_call or self._stops or monotonic() >= due:
                 return environment
-            self._set_progress(is_episode_over=False)
 
     def _act_and_step(self) -> None:
         """Reset environments whose episode is over, choose actions, and step all environments."""
@@ -261,34 +261,33 @@ class TrainingLoop(abc.ABC):
             raise self._unusable(error) from error
         episodes.step(actions)
 
-    def _learn(self) -> int:
+    def _learn(self) -> tuple[int, bool]:
         """Learn steps of environments in order, until an episode ended or a callback is due.
 
-        Returns the environment of the last step learned.
+        Returns the environment of the last step learned, and whether its episode is over. Where it
+        is, `_note_outcome` sets the progress.
         """
-        episodes, n = self._episodes, self.n_steps
-        most, progress = self._next_call - n, []
-        if episodes.n_environments > 1 and self.steps is not None:
-            n_most = min(most, episodes.n_environments)
-            progress = [(n + k) / self.steps for k in range(1, n_most)]
-        environments = episodes.up_to_episode_end(most)
+        episodes, adapter = self._episodes, self._episodes.adapter
+        n_steps, environments, learn = self.n_steps, episodes.unlearned, self._learner.learn
         try:
-            n_learned = self._learner.learn(
+            n_learned = learn(
                 episodes.previous_observations,
                 episodes.actions,
-                episodes.adapter.rewards,
+                adapter.rewards,
                 episodes.observations,
-                episodes.adapter.terminated if self.limit_bootstraps else episodes.ended(),
+                adapter.terminated if self.limit_bootstraps else episodes.ended(),
+                adapter.truncated,
                 environments,
-                progress,
+                self._next_call - n_steps,
+                n_steps,
+                self.steps,
                 episodes.masks,
-                episodes.adapter.dts,
+                adapter.dts,
             )
         except (ValueError, OverflowError) as error:
             raise self._unusable(error, environments[0]) from error
-        episodes.note_learned(environments[:n_learned])
-        self.n_steps += n_learned
-        return environments[n_learned - 1]
+        self.n_steps = n_steps + n_learned
+        return episodes.note_learned(n_learned)
 
     def _note_outcome(self, environment: int) -> Exception | None:
         """Count an episode that ended, evaluate if that is due, and call the callbacks.

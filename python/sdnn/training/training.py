@@ -249,6 +249,7 @@ class Training(TrainingLoop):
         expected = "be a function or None"
         require(is_function, "reset_options", expected, reset_options, TypeError)
         self.reset_options = reset_options
+        self._stops = False
         self.evaluations = []
         self.rows = []
         self.blocks = {}

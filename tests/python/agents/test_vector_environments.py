@@ -451,16 +451,37 @@ def test_learn_each_learns_up_to_the_first_bad_transition():
     agent, by_hand = sdnn_agent(), sdnn_agent()
     agent.n_environments = by_hand.n_environments = 3
     observations = np.zeros((3, 2))
-    core = agent.core_parts()[0]
-    actions = core.act_each(observations, [0, 1, 2])
+    core, _, batch, _ = agent.core_parts()
+    actions = batch([None] * 3)
+    core.act_each(observations, [0, 1, 2], actions)
     for i in range(3):
-        action = by_hand.act(observations[i], environment=i)
-        assert action == np.float32(actions[i])
+        assert by_hand.act(observations[i], environment=i) == actions[i]
     by_hand.learn(Transition(observations[0], actions[0], -1.0, observations[0] + 1, False), 0)
-    step = (observations, actions, [-1.0, np.nan, -1.0], observations + 1, [False] * 3)
-    assert core.learn_each(*step, [0, 1, 2], []) == 1
+    rewards, going = [-1.0, np.nan, -1.0], [False] * 3
+
+    def learn(environments, n_next=3):
+        following = observations[:n_next] + 1
+        ends = (going, going, environments, 3, 0, None)
+        return core.learn_each(observations, actions, rewards, following, *ends)
+
+    assert learn([0, 1, 2]) == 1
     assert states_equal(agent, by_hand)
-    refuses("reward", core.learn_each, *step, [1, 2], [])
-    refuses("environments", core.learn_each, *step, [3], [])
-    refuses("next_observations", core.learn_each, *step[:3], observations[:2], step[4], [2], [])
+    refuses("reward", learn, [1, 2])
+    refuses("environments", learn, [3])
+    refuses("next_observations", learn, [2], 2)
     assert states_equal(agent, by_hand)
+
+
+def test_learn_each_ends_with_an_episode_and_sets_the_progress_before():
+    agent = sdnn_agent()
+    agent.n_environments = 4
+    observations = np.zeros((4, 2))
+    core, _, batch, _ = agent.core_parts()
+    actions = batch([None] * 4)
+    core.act_each(observations, [0, 1, 2, 3], actions)
+    ends = ([False] * 4, [False, False, True, False], [0, 1, 2, 3])
+    step = (observations, actions, [0.0] * 4, observations + 1)
+    assert core.learn_each(*step, *ends, 4, 10, 40) == 3
+    assert core.progress == 12 / 40
+    assert core.learn_each(*step, *ends, 1, 13, 40) == 1
+    assert core.progress == 14 / 40
