@@ -10,6 +10,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 from gymnasium.vector.utils import concatenate, create_empty_array, iterate
+from numpy import ndarray
 
 from sdnn.environments.spaces import has_mask
 from sdnn.environments.types import Element, Elements, Info, Mask, VectorEnv
@@ -33,6 +34,8 @@ class _SyncEnvironments(EnvironmentAdapter):
     def __init__(self, env: gym.vector.SyncVectorEnv) -> None:
         self._env = env
         self._adapters = [SingleEnvironment(single) for single in env.envs]
+        self._space = env.single_observation_space
+        self._shape, self._is_box = self._space.shape, type(self._space) is gym.spaces.Box
         self.n_environments = env.num_envs
         self.masks = [None] * env.num_envs if announces(env, "action_masks") else None
         self.dts = [1.0] * env.num_envs if announces(env, "durations") else None
@@ -68,11 +71,13 @@ class _SyncEnvironments(EnvironmentAdapter):
 
         Observations that do not fit are returned unchanged: the agent's error names them.
         """
-        space = self._env.single_observation_space
-        arrays = [x for x in observations if type(x) is np.ndarray]
-        if any(array.shape != space.shape for array in arrays):
-            return observations
-        if type(space) is gym.spaces.Box and len(arrays) == len(observations):
+        space, n_arrays = self._space, 0
+        for observation in observations:
+            if type(observation) is ndarray:
+                if observation.shape != self._shape:
+                    return observations
+                n_arrays += 1
+        if self._is_box and n_arrays == len(observations):
             rows = np.array(observations)
             if rows.dtype == space.dtype:
                 return rows
