@@ -1,9 +1,13 @@
 #include <pybind11/numpy.h>
+#include <pybind11/stl.h>
 
 #include <cstddef>
+#include <cstdint>
+#include <vector>
 
 #include "arrays.hpp"
 #include "bindings.hpp"
+#include "sdnn/estimators/kernel_sums.hpp"
 #include "sdnn/estimators/kernel_window.hpp"
 #include "sdnn/estimators/prediction_mixture.hpp"
 #include "sdnn/estimators/probability_mixture.hpp"
@@ -79,6 +83,52 @@ void bind_kernel_window(py::module_& module) {
            py::arg("target_limit") = KernelWindow::kUnlimited);
 }
 
+void bind_kernel_sums(py::module_& module) {
+  using estimators::KernelSums;
+  using Bins = ArrayArgument<std::int32_t>;
+  bindings::Class<KernelSums>(
+      module, "KernelSums",
+      "The kernel of all pairs of inputs, between fixed samples and queries, and its sums")
+      .def(py::init([](const std::vector<Numbers>& correlations, const Bins& bins,
+                       std::size_t n_terms, int degree) {
+             std::vector<estimators::InputCorrelations> inputs;
+             for (const Numbers& values : correlations) {
+               core::require(values.ndim() == 1 || values.ndim() == 2, "correlations",
+                             "arrays of one or two dimensions", values.ndim());
+               inputs.push_back({bindings::copied(bindings::flat(values)),
+                                 static_cast<std::size_t>(values.shape(0))});
+             }
+             return KernelSums(std::move(inputs), matrix(bins, "bins", correlations.size()),
+                               n_terms, degree);
+           }),
+           py::arg("correlations"), py::arg("bins"), py::arg("n_terms"), py::arg("degree") = 1)
+      .def(
+          "matrix",
+          [](const KernelSums& self, const Bins& bins) {
+            const auto queries = bindings::copied(matrix(bins, "bins", self.n_inputs()));
+            return bindings::filled<double>(
+                {static_cast<std::size_t>(bins.shape(0)), self.n_samples()}, [&](auto out) {
+                  const bindings::WithoutGIL unlocked(self);
+                  self.matrix(queries, out);
+                });
+          },
+          py::arg("bins"), "The kernel of queries and samples")
+      .def(
+          "sums",
+          [](const KernelSums& self, const Bins& bins, const Numbers& coefficients) {
+            const auto queries = bindings::copied(matrix(bins, "bins", self.n_inputs()));
+            const auto factors = bindings::copied(matrix(coefficients, "coefficients"));
+            const auto n_outputs = static_cast<std::size_t>(coefficients.shape(1));
+            return bindings::filled<double>({static_cast<std::size_t>(bins.shape(0)), n_outputs},
+                                            [&](auto out) {
+                                              const bindings::WithoutGIL unlocked(self);
+                                              self.sums(queries, factors, n_outputs, out);
+                                            });
+          },
+          py::arg("bins"), py::arg("coefficients"),
+          "Sums over samples of kernel times coefficient");
+}
+
 void bind_mixtures(py::module_& module) {
   using estimators::PredictionMixture;
   using estimators::ProbabilityMixture;
@@ -141,5 +191,6 @@ void bind_mixtures(py::module_& module) {
 void bind_experts(py::module_& module) {
   bind_least_squares(module);
   bind_kernel_window(module);
+  bind_kernel_sums(module);
   bind_mixtures(module);
 }

@@ -15,4 +15,5 @@
 #include "sdnn/estimators/detail/transposition.hpp"
 #include "sdnn/estimators/detail/unit_ranking.hpp"
 #include "sdnn/estimators/detail/weight_tiles.hpp"
+#include "sdnn/estimators/kernel_sums.hpp"
 #include "tools/yardsticks.hpp"

@@ -1217,6 +1217,20 @@ class KernelWindow:
     @property
     def n_outputs(self) -> int:
         ...
+class KernelSums:
+    """
+    The kernel of all pairs of inputs, between fixed samples and queries, and its sums
+    """
+    def __init__(self, correlations: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], n_terms: typing.SupportsInt | typing.SupportsIndex, degree: typing.SupportsInt | typing.SupportsIndex = 1) -> None:
+        ...
+    def matrix(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The kernel of queries and samples
+        """
+    def sums(self, bins: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], coefficients: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Sums over samples of kernel times coefficient
+        """
 class PredictionMixture:
     """
     A weighted mean of predictions, whose weights follow their recent errors

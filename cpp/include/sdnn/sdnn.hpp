@@ -73,6 +73,7 @@
 #include "sdnn/environments/acrobot_team.hpp"
 #include "sdnn/environments/goal_schedule.hpp"
 #include "sdnn/estimators/correction_rules.hpp"
+#include "sdnn/estimators/kernel_sums.hpp"
 #include "sdnn/estimators/kernel_window.hpp"
 #include "sdnn/estimators/online_layer.hpp"
 #include "sdnn/estimators/parallel_perceptron.hpp"

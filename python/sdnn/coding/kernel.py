@@ -96,6 +96,11 @@ class AnalyticKernel:
         different inputs.
     n_units : int
         Units per pattern, which decide how much one flipped unit changes.
+
+    Attributes
+    ----------
+    codings, pairs, has_all_pairs
+        The fitted codings, the pairs, and whether these were not given.
     """
 
     def __init__(
@@ -115,7 +120,7 @@ class AnalyticKernel:
         every = [(mu, nu) for mu in inputs for nu in inputs if mu != nu] or [(0, 0)]
         self.codings = tuple(fitted(of_input, n_units) for of_input in coding)
         self.pairs = tuple(every) if pairs is None else _read_pairs(pairs, len(inputs))
-        self._every = pairs is None
+        self.has_all_pairs = pairs is None
         keys = list(map(pattern_key, self.codings))
         different = dict(zip(keys, self.codings, strict=True))
         matrices = {key: of_key.correlations(n_units) for key, of_key in different.items()}
@@ -151,7 +156,9 @@ class AnalyticKernel:
         self, of_inputs: Iterator[NDArray[np.float64]], total: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """Combine the correlations of each input to the kernel; ``total`` is a zeroed buffer."""
-        if self._every and len(self.codings) > 2:  # sum over nu != mu = sum over all - diagonal
+        if (
+            self.has_all_pairs and len(self.codings) > 2
+        ):  # sum over nu != mu = sum over all - diagonal
             squares = np.zeros_like(total)
             for of_input in of_inputs:
                 total += of_input

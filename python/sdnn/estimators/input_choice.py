@@ -76,14 +76,13 @@ def is_mixable(coding: Coding) -> bool:
 
 def positions(table: Array, codings: Sequence[Coding]) -> Floats:
     """Return positions within ranges, from 0 to 1, of features that can be mixed; others are 0."""
+    limits = [coding.even_range() if is_mixable(coding) else None for coding in codings]
+    is_mixed = np.array([pair is not None for pair in limits])
+    low, high = np.array([pair or (0.0, 1.0) for pair in limits]).T
     result = np.zeros(table.shape)
-    for index, coding in enumerate(codings):
-        limits = coding.even_range()
-        if limits is not None and is_mixable(coding):
-            low, high = limits
-            values = np.clip(table[:, index].astype(np.float64), low, high)
-            # The width of the widest range would overflow, that of its halves does not.
-            result[:, index] = (values / 2 - low / 2) / (high / 2 - low / 2)
+    values = np.clip(table[:, is_mixed].astype(np.float64), low[is_mixed], high[is_mixed])
+    # The width of the widest range would overflow, that of its halves does not.
+    result[:, is_mixed] = (values / 2 - low[is_mixed] / 2) / (high / 2 - low / 2)[is_mixed]
     return result
 
 

@@ -20,6 +20,7 @@ from sdnn.estimators.columns import Array, Floats, PairChoice, input_pairs
 from sdnn.estimators.input_choice import Inputs, all_inputs, inputs_to_compare, squared_losses
 from sdnn.estimators.inputs import CodedClassifier, CodedInputs, CodedRegressor
 from sdnn.estimators.intervals import coverage_of, error_bounds, log_sizes
+from sdnn.estimators.kernel_of_samples import KernelOfSamples
 from sdnn.estimators.parameters import RandomState, documents, parameter, wholes, words
 from sdnn.estimators.ridge import (
     Samples,
@@ -27,7 +28,6 @@ from sdnn.estimators.ridge import (
     apply_degree,
     diagonal,
     low_rank_diagonal,
-    row_blocks,
     solve,
     solve_for,
 )
@@ -111,8 +111,9 @@ class BaseKernelRidge(CodedInputs):
     Notes
     -----
     For m components, or m samples if these are fewer, `fit` takes ``48 m^2`` bytes, ``98304 m``
-    more with low rank, 16 MB to choose inputs, `predict` ``65536 m``, and both ``8 n_bins^2`` per
-    different coding. Time grows with the cube of m, and beyond that with the number of samples.
+    more with low rank, 16 MB to choose inputs, `predict` with listed pairs ``65536 m``, and both
+    ``8 n_bins^2`` per different coding. Time grows with the cube of m, and beyond that with the
+    number of samples.
     """
 
     alpha: float | str = parameter("auto", Interval(Real, 0, np.inf, closed="neither"), AUTO)
@@ -208,10 +209,11 @@ class BaseKernelRidge(CodedInputs):
                 least, solution, sizes = loss, solutions[best], models.get(best)
                 self._inputs, self.kernel_, self.degree_ = inputs, kernel, best
                 self.X_fit_ = values[components]
+        self._of_samples = KernelOfSamples(self.kernel_, self.X_fit_, self.degree_)
         if len(table) > len(components):
             del base
-            table = self._inputs.of(table, codings)
-            problem = low_rank_diagonal(lambda rows: self._kernel(table[rows]), components, samples)
+            table, kernel_of = self._inputs.of(table, codings), self._of_samples.matrix
+            problem = low_rank_diagonal(lambda rows: kernel_of(table[rows]), components, samples)
             solution = solve(problem, samples, alpha)
         self.alpha_, self.leave_one_out_error_ = solution.alpha, solution.error
         self.dual_coef_, self.intercept_ = solution.dual, solution.intercept
@@ -228,24 +230,16 @@ class BaseKernelRidge(CodedInputs):
         codings += [RandomInverse().fit(column, N_UNITS) for column in directions.T]
         return AnalyticKernel(codings, pairs=pairs), table
 
-    def _kernel(self, table: Array) -> Floats:
-        """Return the kernel of samples and components."""
-        return apply_degree(self.kernel_(table, self.X_fit_), self.degree_)
-
     def _inputs_of(self, X: ArrayLike) -> Array:
         """Return the kernel's inputs of samples, checked, shape (n_samples, n_inputs)."""
-        check_is_fitted(self, "dual_coef_")
+        if "dual_coef_" not in self.__dict__:  # scikit-learn's check takes longer
+            check_is_fitted(self, "dual_coef_")
         return self._inputs.of(self._validated(X, codings=self.codings_), self.codings_)
 
     def _outputs(self, X: ArrayLike) -> Floats:
         """Return the outputs of samples, shape (n_samples, n_outputs)."""
         table = self._inputs_of(X)
-        return self._sums(table, self.dual_coef_) + self.intercept_
-
-    def _sums(self, table: Array, dual: Floats) -> Floats:
-        """Return the kernel of samples times coefficients, a block of samples at a time."""
-        parts = [self._kernel(table[rows]) @ dual for rows in row_blocks(len(table))]
-        return np.concatenate(parts)
+        return self._of_samples.sums(table, self.dual_coef_) + self.intercept_
 
 
 @explains_names()
@@ -298,7 +292,7 @@ class SDNNKernelRidge(CodedRegressor, BaseKernelRidge):
     def _log_error_sizes(self, table: Array) -> Floats:
         """Predict the logarithms of the sizes of errors, shape (n_samples, n_outputs)."""
         sizes = self._sizes_of_errors
-        return self._sums(table, sizes.dual) + sizes.intercept
+        return self._of_samples.sums(table, sizes.dual) + sizes.intercept
 
     def _error_scales(self, log_sizes: Floats) -> Floats:
         """Return sizes of errors in units of the usual one, within a tenth and ten times of it."""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from sdnn import _core
 from sdnn.coding import Coding, WithMissing
 from sdnn.coding.symbols import missing_as_nan, present
+from sdnn.estimators.bins import InputBins
 from sdnn.estimators.columns import PAIR_BUDGET, Array, Floats, Ints, Pairs
 
 Rule = tuple[Array, float] | tuple[Ints, int, str]
@@ -39,7 +40,7 @@ def code_bytes(codings: Sequence[Coding], pairs: Sequence[tuple[int, int]], n_un
     return int(of_pairs * n_units * 9 / 8)  # each unit is a byte here and a bit in the core
 
 
-class InputCode:
+class InputCode(InputBins):
     """Turns samples into bins, and bins into the code that the network reads.
 
     Each input has a fitted coding, each pair (modified, modifier) the patterns of both, shape
@@ -53,12 +54,11 @@ class InputCode:
         modified: list[NDArray[np.int8]],
         modifiers: list[NDArray[np.int8]],
     ) -> None:
-        self.codings = tuple(codings)
         self.pairs = tuple(pairs)
         self.modified = modified
         self.modifiers = modifiers
         # Inputs that no pair mentions are validated and then ignored.
-        self.used = sorted({index for pair in self.pairs for index in pair})
+        super().__init__(codings, sorted({index for pair in self.pairs for index in pair}))
         number_of = {index: number for number, index in enumerate(self.used)}
         pairs_of_used = [(number_of[mu], number_of[nu]) for mu, nu in self.pairs]
         self.core_pairs = np.array(pairs_of_used, np.int32)
@@ -68,45 +68,6 @@ class InputCode:
 
     def __reduce__(self) -> tuple[object, ...]:
         return InputCode, (self.codings, self.pairs, self.modified, self.modifiers)
-
-    def bins(self, table: Array) -> Ints:
-        """Return the bins of samples, (n_samples, n_inputs) to (n_samples, n inputs in pairs)."""
-        bins = np.empty((len(table), len(self.used)), dtype=np.int32)
-        for number, index in enumerate(self.used):
-            try:
-                bins[:, number] = self.codings[index].bins(table[:, index])
-            except ValueError as error:
-                raise ValueError(f"{error} in column {index}") from None
-        return bins
-
-    @functools.cached_property
-    def _even(self) -> tuple[slice | Ints, Floats, Floats, Floats, Ints] | None:
-        """Inputs, low, high, half widths and n_bins for `bins_of_row`; None for uneven bins."""
-        codings = [present(self.codings[index]) for index in self.used]
-        ranges = [coding.even_range() for coding in codings]
-        if None in ranges:
-            return None
-        every = self.used == list(range(len(self.codings)))
-        low, high = np.array(ranges, dtype=np.float64).T
-        half_width = high / 2 - low / 2  # 0 for a column with a single value
-        half_width[half_width == 0] = 1
-        sizes = np.array([coding.size for coding in codings], dtype=np.int32)
-        used = slice(None) if every else np.array(self.used, dtype=np.int32)
-        return used, low, high, half_width, sizes
-
-    def bins_of_row(self, row: Array) -> Ints:
-        """Return the bins of one sample: faster than `bins` where all bins have equal width."""
-        if self._even is None or row.dtype != np.float64:
-            return self.bins(row[None])
-        used, low, high, half_width, sizes = self._even
-        values = row[used]
-        inside = np.minimum(np.maximum(values, low), high)
-        positions = (inside / 2 - low / 2) / half_width  # as in `sdnn.coding.numeric`
-        is_missing = values != values
-        positions[is_missing] = 0
-        bins: Ints = np.minimum((positions * sizes).astype(np.int32), sizes - 1)
-        bins[is_missing] = sizes[is_missing]
-        return bins[None]
 
     @functools.cached_property
     def _ranges(self) -> tuple[list[int], Floats, Floats]:

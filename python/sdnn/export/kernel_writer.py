@@ -48,7 +48,7 @@ class KernelWriter(HeaderText):
 
     @property
     def _has_all_pairs(self) -> bool:
-        return self.kernel._every and len(self.inputs) > 2
+        return self.kernel.has_all_pairs and len(self.inputs) > 2
 
     def about(self) -> str:
         """Describe the size of the estimator."""

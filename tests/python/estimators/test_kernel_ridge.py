@@ -178,6 +178,21 @@ def test_the_kernel_of_all_pairs_equals_that_of_listed_pairs():
     )
 
 
+@pytest.mark.parametrize("pairs", ["all", [("x", "angle"), ("kind", "gaps")]])
+def test_predictions_are_sums_of_the_analytic_kernel(pairs):
+    frame = pd.DataFrame({"x": X[:, 0], "angle": 360 * X[:, 1], "kind": LABELS, "gaps": X[:, 3]})
+    frame.loc[::7, "gaps"] = np.nan
+    codings = [(Circular(period=360.0), ["angle"]), ("symbolic", ["kind"])]
+    codings.append((RandomInverse(length_scale=0.001), ["x"]))  # powers below the smallest number
+    for coding in codings, codings[:2]:
+        model = SDNNKernelRidge(coding, pairs=pairs, inputs="all", degree=2, alpha=0.01)
+        model.fit(frame[:90], Y[:90])
+        table = frame.to_numpy(dtype=object)
+        kernel = model.kernel_(table, model.X_fit_)
+        expected = (kernel + kernel**2) / 2 @ model.dual_coef_ + model.intercept_
+        np.testing.assert_allclose(model.predict(frame), expected[:, 0], rtol=1e-10)
+
+
 def test_ridge_regression_scores_better_than_the_network_on_noise():
     noisy = Y + np.random.RandomState(1).normal(0, 0.5, len(Y))
     fresh = np.random.RandomState(2).uniform(0, 1, (300, 4))

@@ -54,6 +54,10 @@ SDNN_INLINE std::uint64_t bits_of(double value) noexcept {
   return std::bit_cast<std::uint64_t>(value);
 }
 SDNN_INLINE double double_of(std::uint64_t bits) noexcept { return std::bit_cast<double>(bits); }
+/// The smaller of two numbers, the second if neither is.
+SDNN_INLINE double smaller(double first, double second) noexcept {
+  return first < second ? first : second;
+}
 
 #if SDNN_LANES
 
@@ -164,6 +168,11 @@ SDNN_INLINE Lanes<Size> select(const LaneBits<Size>& mask, const Lanes<Size>& fi
                                const Lanes<Size>& second) noexcept {
   using Vector = typename LaneBits<Size>::Vector;
   return double_of(LaneBits<Size>{((Vector)first.v & mask.v) | ((Vector)second.v & ~mask.v)});
+}
+
+template <std::size_t Size>
+SDNN_INLINE Lanes<Size> smaller(const Lanes<Size>& first, const Lanes<Size>& second) noexcept {
+  return Lanes<Size>(first.v < second.v ? first.v : second.v);
 }
 
 template <std::size_t Size>
