@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import abc
 import dataclasses
+import math
 from collections.abc import Sequence
 from numbers import Real
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from joblib import effective_n_jobs
@@ -29,7 +30,7 @@ from sdnn.estimators.network import (
     units_for_pairs,
 )
 from sdnn.estimators.outliers import warn_caller
-from sdnn.estimators.pair_selection import select_pairs, with_categories
+from sdnn.estimators.pair_selection import select_pairs, select_pairs_with_part, with_categories
 from sdnn.estimators.parameters import SHARE, RandomState, parameter, wholes, words
 from sdnn.estimators.training import (
     LARGE_SAMPLE,
@@ -65,12 +66,14 @@ class BaseSDNN(Fitted, CodedInputs):
         Whether learned ranges leave out outliers; "auto" those farthest away, with an
         `OutlierWarning`.
     n_pattern_units : int, optional
-        Units per pattern, even. None divides about 16,000 columns among the pairs.
+        Units per pattern, even. None divides about 16,000 columns among the pairs; from 5,001
+        samples on with ``pairs="budget"`` 4,000, but takes 178 units where 16,000 columns have them.
     pairs : "budget", "all", "auto" or list of (modified, modifier), default="budget"
         Pairs of features, by number or name; a modifier of None leaves a pattern plain. "budget"
         takes all pairs up to 22 features, beyond that an even random share: 500 pairs, or one per
         feature. "auto" drops features that do not matter, half of them at a time, by the score of a
-        held-out fifth, which takes up to five times as long.
+        held-out fifth, which takes up to five times as long. From 5,001 samples on "budget" does so
+        too, with 5,000 of them and small networks.
     tables : {"shared", "separate"}, default="shared"
         One table of patterns per input, permuted for each pair, or two tables per pair.
     max_iter : int, optional
@@ -82,9 +85,10 @@ class BaseSDNN(Fitted, CodedInputs):
         resumes from the last alone.
     correction_share : float
         Share of the missing or superfluous units that a sample corrects, at least one; in (0, 1].
-        Default: 1 in regression; 1/4 in classification, where samples of classes overlap. Where
-        inputs repeat, `fit` learns the mean target, and `partial_fit` follows the latest targets;
-        there a share of 0.1 averages over more of them.
+        Default: 1 in regression, of which `fit` takes half from 50,001 samples on; 1/4 in
+        classification, where samples of classes overlap. Where inputs repeat, `fit` learns the mean
+        target, and `partial_fit` follows the latest targets; there a share of 0.1 averages over
+        more of them.
     shuffle : bool, default=True
         Whether each epoch has a new random order; from 5,001 samples without weights on, of blocks
         of 512 samples, which are drawn once: half of the time.
@@ -149,6 +153,8 @@ class BaseSDNN(Fitted, CodedInputs):
     verbose: int = parameter(0, "verbose")
 
     refit = False  # the regressor lets its users choose it
+    _largest_full_sample: ClassVar[float] = math.inf
+    """Size from which on `fit` halves the share of corrections, to average more noise."""
 
     @abc.abstractmethod
     def _check_samples(
@@ -199,7 +205,8 @@ class BaseSDNN(Fitted, CodedInputs):
             random = self._resume(table, observed)
         else:
             pairs = self._select_pairs(X, table, observed, weights)
-            random = self._begin(X, table, observed, pairs, self._n_networks(len(table)))
+            n_networks, is_large = self._n_networks(len(table)), self._is_large(table)
+            random = self._begin(X, table, observed, pairs, n_networks, is_large)
         targets = self._targets(observed, at_once=True)
         bins = self.network_.input_code.bins(table)
         share = self.validation_fraction if self.early_stopping else 0.0
@@ -221,7 +228,8 @@ class BaseSDNN(Fitted, CodedInputs):
             # few epochs.
             n_epochs = min(max_iter, 2) if in_blocks else max_iter
             learned = self._targets_to_learn(bins[rows], targets[rows], weights_of_rows)
-            trainer = self._trainer(bins[rows], learned, n_epochs)
+            part = 0.5 if n_samples > self._largest_full_sample else 1.0
+            trainer = self._trainer(bins[rows], learned, n_epochs, part)
             return trainer, run_epochs(
                 self, trainer, n_samples, max_iter, random, scored, times, n_averaged, in_blocks
             )
@@ -293,7 +301,13 @@ class BaseSDNN(Fitted, CodedInputs):
         return self
 
     def _begin(
-        self, X: object, table: Array, y: ArrayLike, pairs: Pairs | None = None, n_networks: int = 1
+        self,
+        X: object,
+        table: Array,
+        y: ArrayLike,
+        pairs: Pairs | None = None,
+        n_networks: int = 1,
+        is_large: bool = False,
     ) -> np.random.RandomState:
         """Fit the codings, draw tables and weights; return the generator for orders of samples."""
         n_units = self._set_outputs(y)
@@ -302,7 +316,7 @@ class BaseSDNN(Fitted, CodedInputs):
         code_seed, weight_seed = (int(seed) for seed in random.randint(2**31 - 1, size=2))
         if pairs is None:
             pairs = input_pairs(self.pairs, self._feature_names(), table.shape[1], code_seed)
-        n_pattern_units = self.n_pattern_units or units_for_pairs(len(pairs))
+        n_pattern_units = self.n_pattern_units or units_for_pairs(len(pairs), is_large)
         if n_pattern_units % 2:
             raise ValueError(f"n_pattern_units must be even, got {n_pattern_units}")
         fitted = self._fit_codings(codings, table, n_pattern_units)
@@ -331,8 +345,10 @@ class BaseSDNN(Fitted, CodedInputs):
     def _select_pairs(
         self, X: ArrayLike, table: Array, y: Array, weights: Floats | None
     ) -> Pairs | None:
-        """Return the pairs selected with a hold-out; None without ``pairs="auto"``."""
-        if not (isinstance(self.pairs, str) and self.pairs == "auto") or table.shape[1] < 2:
+        """Return the pairs selected with a hold-out; None if all are taken, or a random share."""
+        is_large = self._is_large(table)
+        is_auto = isinstance(self.pairs, str) and self.pairs == "auto"
+        if not (is_auto or is_large) or table.shape[1] < 2:
             return None
         seed = int(check_random_state(self.random_state).randint(2**31 - 1))
         model = clone(self).set_params(random_state=seed, early_stopping=False, verbose=0)
@@ -340,7 +356,12 @@ class BaseSDNN(Fitted, CodedInputs):
         complete = [with_categories(coding, table[:, i]) for i, coding in enumerate(codings)]
         if complete != codings:
             model.set_params(coding=[(coding, [index]) for index, coding in enumerate(complete)])
-        return select_pairs(model, X, y, weights, table.shape[1], seed)
+        select = select_pairs_with_part if is_large else select_pairs
+        return select(model, X, y, weights, table.shape[1], seed)
+
+    def _is_large(self, table: Array) -> bool:
+        """Return whether some of many samples select the features."""
+        return isinstance(self.pairs, str) and self.pairs == "budget" and len(table) > LARGE_SAMPLE
 
     def _n_networks(self, n_samples: int) -> int:
         """Return the most networks that `fit` keeps, averaged ones included."""
@@ -352,7 +373,9 @@ class BaseSDNN(Fitted, CodedInputs):
     def _n_threads(self) -> int:
         return int(effective_n_jobs(self.n_jobs))
 
-    def _trainer(self, bins: Ints, targets: Array, n_epochs: int) -> Trainer:
+    def _trainer(
+        self, bins: Ints, targets: Array, n_epochs: int, part_of_share: float = 1.0
+    ) -> Trainer:
         rule = self._rule_arguments(targets)
         options: dict[str, Any] = {
             "form": self.training,
@@ -361,7 +384,9 @@ class BaseSDNN(Fitted, CodedInputs):
             "n_epochs": n_epochs,
         }
         if len(rule) == 2:
-            return _core.PDeltaTrainer(self.network_.layer, bins, *rule, **options)
+            counts, share = rule
+            share *= part_of_share
+            return _core.PDeltaTrainer(self.network_.layer, bins, counts, share, **options)
         return _core.PerceptronTrainer(self.network_.layer, bins, *rule, **options)
 
     def _learn(self, bins: Ints, targets: Array) -> None:

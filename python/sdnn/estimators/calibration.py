@@ -56,6 +56,7 @@ def learn_without_fifth(
         verbose=0,
         coding=[(coding, [index]) for index, coding in enumerate(fitted.codings_)],
         pairs=[(mu, None if mu == nu else nu) for mu, nu in fitted.pairs_],
+        n_pattern_units=fitted.network_.input_code.core.n_units,
     )
     kept, held = np.flatnonzero(~is_held), np.flatnonzero(is_held)
     weights_of_kept = None if sample_weight is None else weights[kept]

@@ -19,19 +19,28 @@ from sdnn.estimators.columns import PAIR_BUDGET, Array, Floats, Ints, Pairs
 Rule = tuple[Array, float] | tuple[Ints, int, str]
 """Arguments of learning: (counts, share) of the p-delta rule, or (labels, n_classes, scheme)."""
 COLUMN_BUDGET = 16000  # columns divided among the pairs by default
+LARGE_COLUMN_BUDGET = 4000  # of many samples
+ENOUGH_UNITS = 178  # units per pattern, of all pairs of 10 inputs with either budget
 FEW_SAMPLES = 32  # largest number of samples that weights in bytes learn faster
 FEW_TO_PREDICT = 12  # largest number of samples that weights in bytes predict faster
 WORTH_BYTES = 2  # number of single predictions after which weights are copied into bytes
 
 
-def units_for_pairs(n_pairs: int) -> int:
+def units_for_pairs(n_pairs: int, is_large: bool = False) -> int:
     """Return the units per pattern with which the whole code is about `COLUMN_BUDGET` wide.
+
+    ``is_large`` takes fewer columns for many samples, as far as patterns keep `ENOUGH_UNITS`.
 
     >>> [units_for_pairs(n) for n in (2, 90, 500, 870, 4032)]
     [2000, 178, 32, 18, 8]
+    >>> [units_for_pairs(n, is_large=True) for n in (2, 20, 90)]
+    [2000, 200, 178]
     """
     least = 32 if n_pairs <= PAIR_BUDGET else 8
-    return min(2000, max(least, 2 * round(COLUMN_BUDGET / n_pairs / 2)))
+    n_units = min(2000, max(least, 2 * round(COLUMN_BUDGET / n_pairs / 2)))
+    if is_large:
+        n_units = min(n_units, max(ENOUGH_UNITS, 2 * round(LARGE_COLUMN_BUDGET / n_pairs / 2)))
+    return n_units
 
 
 def code_bytes(codings: Sequence[Coding], pairs: Sequence[tuple[int, int]], n_units: int) -> int:

@@ -1,4 +1,8 @@
-"""Selection of the features that matter by repeated halving and one hold-out."""
+"""Selection of the features that matter by repeated halving and one hold-out.
+
+Useless features cost a network of many samples time and accuracy, so that some of the samples first
+decide which features it has.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +15,11 @@ from sdnn.coding import Coding, CorrelationMatrix, Symbolic, WithMissing
 from sdnn.coding.symbols import present
 from sdnn.estimators.columns import Array, Floats, Pairs, input_pairs
 from sdnn.estimators.training import FEWEST_SAMPLES, held_out_fifth
+
+PART = 5000  # samples that decide, of larger samples
+EPOCHS_OF_PART = 4
+COLUMNS_OF_PART = 6000  # columns divided among the pairs
+FEWEST_UNITS, MOST_UNITS = 32, 64
 
 
 def with_categories(coding: Coding, column: Array) -> Coding:
@@ -67,3 +76,17 @@ def select_pairs(
             return best[1]
         ranked = np.argsort(-fitted._weight_changes()[features], kind="stable")
         features = np.sort(features[ranked[: (len(features) + 1) // 2]])
+
+
+def select_pairs_with_part(
+    model: BaseEstimator, X: ArrayLike, y: Array, weights: Floats | None, n_features: int, seed: int
+) -> Pairs:
+    """Return the pairs that `select_pairs` returns for `PART` samples and a small network."""
+    rows = np.sort(np.random.RandomState(seed).permutation(len(y))[:PART])
+    n_pairs = len(pairs_among(np.arange(n_features), seed))
+    n_units = min(MOST_UNITS, max(FEWEST_UNITS, 2 * round(COLUMNS_OF_PART / n_pairs / 2)))
+    model.set_params(n_pattern_units=n_units, max_iter=EPOCHS_OF_PART)
+    weights_of_part = None if weights is None else weights[rows]
+    return select_pairs(
+        model, _safe_indexing(X, rows), np.asarray(y)[rows], weights_of_part, n_features, seed
+    )

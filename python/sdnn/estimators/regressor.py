@@ -82,6 +82,8 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
     refit: bool = parameter(False, "boolean")
     calibrate: bool = parameter(False, "boolean")
 
+    _largest_full_sample = 50_000
+
     def partial_fit(
         self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None
     ) -> Self:

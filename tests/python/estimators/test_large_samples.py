@@ -57,6 +57,33 @@ def test_early_stopping_and_sample_weights_work_with_blocks():
     assert twice.score(X, Y) > 0.95
 
 
+@pytest.mark.usefixtures("few_are_many")
+@pytest.mark.parametrize("make", [SDNNRegressor, SDNNClassifier])
+def test_a_part_of_many_samples_selects_the_features(make):
+    useless = np.random.RandomState(1).uniform(size=(len(X), 9))
+    samples = np.column_stack([useless, X])
+    y = Y if make is SDNNRegressor else np.median(Y) < Y
+    options = {**OPTIONS, "n_pattern_units": None}
+    model = make(**options).fit(samples, y)
+    assert {9, 10} <= {feature for pair in model.pairs_ for feature in pair}
+    assert len(model.pairs_) <= 30
+    every = make(**options, pairs="all").fit(samples, y)
+    assert len(every.pairs_) == 132
+    assert model.score(samples, y) > every.score(samples, y) - 0.02
+    few = make(**options).fit(samples[:1000], y[:1000])
+    assert len(few.pairs_) == 132
+
+
+def test_very_many_samples_are_corrected_by_half(monkeypatch):
+    half = SDNNRegressor(**OPTIONS, correction_share=0.5).fit(X, Y)
+    monkeypatch.setattr(SDNNRegressor, "_largest_full_sample", len(X))
+    at_limit = SDNNRegressor(**OPTIONS).fit(X, Y)
+    monkeypatch.setattr(SDNNRegressor, "_largest_full_sample", len(X) - 1)
+    beyond = SDNNRegressor(**OPTIONS).fit(X, Y)
+    np.testing.assert_array_equal(beyond.weights_, half.weights_)
+    assert (at_limit.weights_ != half.weights_).any()
+
+
 def test_blocks_in_any_order_have_the_bits_of_single_samples():
     code = SDNNRegressor(RandomInverse(low=0, high=1), **{**OPTIONS, "max_iter": 1})
     network = code.fit(X, Y).network_
