@@ -67,7 +67,7 @@ class BaseSDNN(Fitted, CodedInputs):
         `OutlierWarning`.
     n_pattern_units : int, optional
         Units per pattern, even. None divides about 16,000 columns among the pairs; from 5,001
-        samples on with ``pairs="budget"`` 4,000, but takes 178 units where 16,000 columns have them.
+        samples on with ``pairs="budget"`` 4,000, or more for 178 units per pattern.
     pairs : "budget", "all", "auto" or list of (modified, modifier), default="budget"
         Pairs of features, by number or name; a modifier of None leaves a pattern plain. "budget"
         takes all pairs up to 22 features, beyond that an even random share: 500 pairs, or one per
