@@ -2,7 +2,7 @@
 
     OMP_NUM_THREADS=1 python bench/estimators/large.py [--seeds 5] [--only WORD] [--redraw]
 
-Measures what the store lacks, and writes the tables of performance.md in docs/evidence. The models
+Measures what the store lacks, and writes the tables of problems.md in docs/evidence. The models
 of a sample take turns, so that their ratios hold on a busy machine. Needs catboost and lightgbm.
 """
 
@@ -162,7 +162,7 @@ def main():
     results = measured(KIND, arguments.folder)
     tables = {f"large samples, {name}": fit_table(results, name) for name in PROBLEMS}
     tables["prediction of large samples"] = prediction_table(results)
-    show(tables, arguments.folder / "performance.md")
+    show(tables, arguments.folder / "problems.md")
 
 
 if __name__ == "__main__":

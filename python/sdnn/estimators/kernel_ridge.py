@@ -190,27 +190,31 @@ class BaseKernelRidge(CodedInputs):
             random = check_random_state(self.random_state)
             components = np.sort(random.choice(components, self.max_components, replace=False))
         alpha = None if self.alpha == "auto" else real("alpha", self.alpha)
-        part, least = samples[components], math.inf
-        for inputs in possible:
-            kernel, values = self._kernel_of(inputs, table)
-            base = kernel(values[components])
-            solutions, models = {}, {}
-            for degree in degrees:
-                problem = diagonal(apply_degree(base.copy(), degree), part)
-                solutions[degree] = solve(problem, part, alpha)
-                if models_errors:
-                    errors = log_sizes(part.targets - solutions[degree].left_out)
-                    model = solve_for(problem, part, errors)
-                    models[degree] = dataclasses.replace(model, rows=components)
-                del problem  # free its memory before the next degree needs as much
-            best = min(solutions, key=lambda degree: solutions[degree].error)
-            loss = float(part.weights @ self._losses(part, solutions[best].left_out))
-            if loss < least or inputs is possible[0]:
-                least, solution, sizes = loss, solutions[best], models.get(best)
-                self._inputs, self.kernel_, self.degree_ = inputs, kernel, best
-                self.X_fit_ = values[components]
+        is_exact = len(components) == len(table)
+        # With low rank, half of the components choose inputs and degree, in an eighth of the time.
+        for rows in [components] if is_exact else [components[::2], components]:
+            part, least = samples[rows], math.inf
+            for inputs in possible:
+                kernel, values = self._kernel_of(inputs, table)
+                base = kernel(values[rows])
+                solutions, models = {}, {}
+                for degree in degrees:
+                    problem = diagonal(apply_degree(base.copy(), degree), part)
+                    solutions[degree] = solve(problem, part, alpha)
+                    if models_errors:
+                        errors = log_sizes(part.targets - solutions[degree].left_out)
+                        model = solve_for(problem, part, errors)
+                        models[degree] = dataclasses.replace(model, rows=rows)
+                    del problem  # free its memory before the next degree needs as much
+                best = min(solutions, key=lambda degree: solutions[degree].error)
+                loss = float(part.weights @ self._losses(part, solutions[best].left_out))
+                if loss < least or inputs is possible[0]:
+                    least, solution, sizes = loss, solutions[best], models.get(best)
+                    self._inputs, self.kernel_, self.degree_ = inputs, kernel, best
+                    self.X_fit_ = values[rows]
+            possible, degrees = [self._inputs], (self.degree_,)
         self._of_samples = KernelOfSamples(self.kernel_, self.X_fit_, self.degree_)
-        if len(table) > len(components):
+        if not is_exact:
             del base
             table, kernel_of = self._inputs.of(table, codings), self._of_samples.matrix
             problem = low_rank_diagonal(lambda rows: kernel_of(table[rows]), components, samples)
