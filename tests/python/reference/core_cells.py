@@ -97,6 +97,10 @@ GOOD = {
         "low": [0.0, -1.0], "high": [1.0, 1.0], "n_outputs": 2, "capacity": 5, "length_scale": 1.0,
         "ridge": 0.1, "target_limit": 20.0,
     },
+    "KernelSums": lambda: {
+        "correlations": [[1.0, 0.5, 0.25], [[1.0, 0.5], [0.5, 1.0]]], "bins": [[0, 1], [2, 0]],
+        "n_terms": 2, "degree": 2,
+    },
     "ProbabilityMixture": lambda: {"n_scorers": 2},
     "LinearSDNN": lambda: {"config": linear_config(), "n_actions": [3, 4], "seed": 1},
     "BareAgent": lambda: {
@@ -149,6 +153,8 @@ METHODS = {
     ("KernelWindow", "add_inputs"): {"low": [0.0], "high": [1.0]},
     ("KernelWindow", "add_outputs"): {"n": 1},
     ("KernelWindow", "restore"): {"state": {}},
+    ("KernelSums", "matrix"): {"bins": [[1, 1]]},
+    ("KernelSums", "sums"): {"bins": [[1, 1]], "coefficients": [[0.5], [0.25]]},
     ("PredictionMixture", "mix"): {"predictions": [1.0, 2.0, 3.0]},
     ("PredictionMixture", "learn"): {"predictions": [1.0, 2.0, 3.0], "target": 1.0},
     ("PredictionMixture", "restore"): {"state": {}},
