@@ -348,7 +348,7 @@ class BaseSDNN(Fitted, CodedInputs):
         """Return the pairs selected with a hold-out; None if all are taken, or a random share."""
         is_large = self._is_large(table)
         is_auto = isinstance(self.pairs, str) and self.pairs == "auto"
-        if not (is_auto or is_large) or table.shape[1] < 2:
+        if not (is_auto or is_large) or table.shape[1] < (2 if is_auto else 3):
             return None
         seed = int(check_random_state(self.random_state).randint(2**31 - 1))
         model = clone(self).set_params(random_state=seed, early_stopping=False, verbose=0)
