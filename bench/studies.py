@@ -41,7 +41,10 @@ class Clock(Callback):
         self._milestone = milestone
         self.curve: dict[str, Any] = {"steps": [], "cpu_seconds": [], "mean_return": []}
         training.callbacks = (*training.callbacks, self)
-        training.evaluation_env = _Pausing(training.evaluation_env, self)
+        env = training.evaluation_env
+        if env.has_wrapper_attr("evaluation_steps"):  # endless, otherwise
+            env = gym.wrappers.TimeLimit(env, env.get_wrapper_attr("evaluation_steps"))
+        training.evaluation_env = _Pausing(env, self)
         self._few = training.evaluation_episodes
         self._expect_milestone(training)
         self._began, self._paused = time.process_time(), None

@@ -1,7 +1,8 @@
-"""Noisy, copied and irrelevant inputs for any task: the environment bench/Sensors-v0."""
+"""Other sensors, delays and rewards for any task: the environment bench/Sensors-v0."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium as gym
@@ -13,6 +14,8 @@ RANGES = {"CartPole-v1": ((-2.4, -3.0, -0.21, -3.5), (2.4, 3.0, 0.21, 3.5))}
 """Ends that noise is measured by, of tasks whose space has infinite ones."""
 LARGEST = 3.0
 """Where autocorrelated inputs, of variance 1, are clipped."""
+EVALUATION_STEPS = 200
+"""Steps of an episode of an endless task, in evaluations."""
 
 
 class Sensors(gym.ObservationWrapper):
@@ -25,6 +28,8 @@ class Sensors(gym.ObservationWrapper):
     noise
         Standard deviation of independent noise on every variable and copy, in parts of its range;
         sums outside the space saturate.
+    hidden
+        Indices of variables that are not observed.
     copies
         Further sensors of every variable, each with noise of its own.
     irrelevant
@@ -37,10 +42,12 @@ class Sensors(gym.ObservationWrapper):
 
     def __init__(
         self, env: gym.Env, *, noise: float = 0.0, copies: int = 0, irrelevant: int = 0,
-        correlation: float = 0.0, ends: Any = None,
+        correlation: float = 0.0, ends: Any = None, hidden: Sequence[int] = (),
     ) -> None:  # fmt: skip
         super().__init__(gym.wrappers.FlattenObservation(env))
-        low, high = (np.tile(one, 1 + copies) for one in flat_bounds(env.observation_space))
+        low, high = flat_bounds(env.observation_space)
+        self._is_sensed = ~np.isin(np.arange(low.size), hidden)
+        low, high = (np.tile(one[self._is_sensed], 1 + copies) for one in (low, high))
         first, last = (low, high) if ends is None else (np.tile(e, 1 + copies) for e in ends)
         self._deviation = noise * (last - first)
         if noise and not np.isfinite(self._deviation).all():
@@ -62,7 +69,7 @@ class Sensors(gym.ObservationWrapper):
 
     def observation(self, observation):
         """Observe with noise."""
-        sensed = np.tile(observation, 1 + self._n_copies)
+        sensed = np.tile(observation[self._is_sensed], 1 + self._n_copies)
         if self._deviation.any():
             sensed = sensed + self._deviation * self._random.standard_normal(sensed.size)
             sensed = np.clip(sensed, self._low, self._high)
@@ -77,8 +84,49 @@ class Sensors(gym.ObservationWrapper):
         return np.clip(self._irrelevant, -LARGEST, LARGEST)
 
 
-def _make(task: str, **options: Any) -> Sensors:
-    return Sensors(gym.make(task), ends=RANGES.get(task), **options)
+class Delayed(gym.Wrapper):
+    """Actions take effect a number of steps late; those before the first one are 0."""
+
+    def __init__(self, env: gym.Env, n_steps: int) -> None:
+        super().__init__(env)
+        self._n_steps = n_steps
+
+    def reset(self, **options):
+        """Begin an episode."""
+        self._pending = [0 * self.action_space.sample() for _ in range(self._n_steps)]
+        return super().reset(**options)
+
+    def step(self, action):
+        """Take the action that is due."""
+        self._pending.append(action)
+        return super().step(self._pending.pop(0))
+
+
+class GoalOnly(gym.Wrapper):
+    """The only reward is 1 where the episode terminates."""
+
+    def step(self, action):
+        """Take a step."""
+        observation, _, terminated, truncated, info = super().step(action)
+        return observation, float(terminated), terminated, truncated, info
+
+
+class Endless(gym.Wrapper):
+    """A task without episodes, except in evaluations; see `studies.Clock`."""
+
+    evaluation_steps = EVALUATION_STEPS
+
+
+def _make(
+    task: str, delay: int = 0, endless: bool = False, goal_only: bool = False, **options: Any
+) -> gym.Env:
+    env = gym.make(task, max_episode_steps=-1) if endless else gym.make(task)
+    if delay:
+        env = Delayed(env, delay)
+    if goal_only:
+        env = GoalOnly(env)
+    env = Sensors(env, ends=RANGES.get(task), **options)
+    return Endless(env) if endless else env
 
 
 gym.register("bench/Sensors-v0", entry_point=_make)

@@ -37,11 +37,14 @@ TASKS = {
     "CliffWalking": Task(-17.0, -5042.0),
     "FrozenLake": Task(0.69, 0.014),
     "Taxi": Task(0.0, -765.0),
-    # Gymnasium's thresholds.
+    # Gymnasium's thresholds; Walker2d has none, and takes Hopper's.
     "InvertedPendulum": Task(950.0, 5.1),
     "Reacher": Task(-3.75, -42.9),
     "Hopper": Task(3800.0, 18.1),
     "HalfCheetah": Task(4800.0, -236.6),
+    "Walker2d": Task(3800.0, 2.0),
+    "Swimmer": Task(360.0, -0.2),
+    "InvertedDoublePendulum": Task(9100.0, 50.1),
 }
 CLEAN = "clean"
 
