@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from report import OURS, score
 from studies import Curves
-from tasks import TASKS
+from tasks import CLEAN, TASKS, parts_of
 
 from sdnn.reports.plots import COLORS, png_bytes
 from sdnn.runs.report import require_matplotlib
@@ -21,7 +21,8 @@ def draw(study: Study, results: Curves, path: Path) -> None:
     require_matplotlib()
     from matplotlib.figure import Figure
 
-    names = [name for name in TASKS if any(case == name for case, _ in results)]
+    clean = {case for case, _ in results if parts_of(case)[1] == CLEAN}
+    names = [name for name in TASKS if name in clean]
     if not names:
         return
     n_columns = min(len(names), 4)

@@ -16,6 +16,8 @@ from sdnn.runs import EnvironmentSpec
 from sdnn.runs.study import Study
 
 OURS = "q-lambda"
+DEFAULT = "q-lambda-auto"
+"""Ours with the default history of observations, where that makes a difference."""
 STEPS = (10_000, 20_000, 50_000, 100_000, 200_000)
 NOTABLE = 0.02
 """A difference worth telling, in parts of the way from random actions to a solved task."""
@@ -39,8 +41,14 @@ def last_returns(trials: Trials) -> NDArray[np.float64]:
 
 def score(case: str, trials: Trials) -> float:
     """Median return at the end: 0 is that of random actions, 1 solves the task."""
-    value: float = TASKS[parts_of(case)[0]].score(np.median(last_returns(trials)))
+    task = TASKS.get(case) or TASKS[parts_of(case)[0]]
+    value: float = task.score(np.median(last_returns(trials)))
     return value
+
+
+def ours_in(results: Curves, case: str) -> Trials:
+    """Return the trials of the default agent in a case."""
+    return results.get((case, DEFAULT)) or results.get((case, OURS), ())
 
 
 def _goal_rows(results: Curves) -> Iterator[Sequence[str]]:
@@ -116,13 +124,15 @@ def _loss_rows(study: Study, results: Curves) -> Iterator[Sequence[str]]:
     """Tell where an agent's median is notably better than ours, the largest difference first."""
     losses = []
     for (case, variant), trials in results.items():
-        ours = results.get((case, OURS))
-        if ours and variant != OURS:
+        ours = ours_in(results, case)
+        if ours and variant not in (OURS, DEFAULT):
             difference = score(case, trials) - score(case, ours)
             if difference > NOTABLE:
                 losses.append((difference, case, variant))
     for difference, case, variant in sorted(losses, reverse=True):
-        medians = (last_returns(results[case, who]) for who in (variant, OURS))
+        medians = (
+            last_returns(trials) for trials in (results[case, variant], ours_in(results, case))
+        )
         theirs, our = (
             f"{number(np.median(m))} ({m.size} seed{'s' * (m.size > 1)})" for m in medians
         )
@@ -167,8 +177,8 @@ def tables(study: Study, results: Curves) -> dict[str, str]:
     return {
         "goals": markdown(goals, _goal_rows(results)),
         "at the end": markdown(*_end_table(study, results, clean, ["task"])),
-        "other sensors": markdown(*_end_table(study, results, compared, ["task", "sensors"])),
-        "ours, other sensors": markdown(["sensors", *tasks], _ours_rows(results, tasks, sensors)),
+        "other sensors": markdown(*_end_table(study, results, compared, ["task", "change"])),
+        "ours, other sensors": markdown(["change", *tasks], _ours_rows(results, tasks, sensors)),
         "losses": markdown(losses, _loss_rows(study, results)),
         "costs": markdown(("agent", "us a step", "KiB"), _cost_rows(study, results)),
     }

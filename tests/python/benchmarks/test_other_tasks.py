@@ -145,6 +145,10 @@ def test_tables_of_two_hand_made_trials_are_as_worked_by_hand(scripts):
     assert "| SDNNQLambda | 20 | 2 |" in tables["costs"]
     along = scripts.report.along_the_way(scripts.study, trials)
     assert "| 2 | 10 | 16 | 475 |" in along, "whole medians of both trials"
+    case = "MountainCar goal-only"
+    goal_only = {(case, "q-lambda-auto"): [trial(0.5)], (case, "stream-ac"): [trial(1.0)]}
+    loss = scripts.report.tables(scripts.study, goal_only)["losses"].splitlines()[2]
+    assert loss.endswith("| 1.00 (1 seed) | 0.50 (1 seed) | 50 % |"), "the case has its own scale"
 
 
 def test_processor_time_excludes_evaluations(scripts, monkeypatch):
@@ -249,6 +253,37 @@ def test_sensor_wrappers_have_the_stated_noise_and_correlation(scripts):
     observation, _ = plain.reset(seed=1)
     assert np.array_equal(observation[:3], gym.make("Pendulum-v1").reset(seed=1)[0])
     assert np.all(np.abs(observation[3:]) < 1)
+
+
+def test_wrappers_hide_variables_delay_actions_and_leave_the_goals_reward(scripts):
+    def rollout(env, actions, seed=3):
+        return [env.reset(seed=seed)[0], *(env.step(a)[0] for a in actions)]
+
+    usual = gym.make("CartPole-v1")
+    shown = rollout(gym.make("bench/Sensors-v0", task="CartPole-v1", hidden=[1, 3]), [1, 1, 0])
+    assert np.array_equal(shown, np.array(rollout(usual, [1, 1, 0]))[:, [0, 2]])
+    late = rollout(gym.make("bench/Sensors-v0", task="CartPole-v1", delay=2), [1, 1, 0, 0])
+    assert np.array_equal(late, rollout(usual, [0, 0, 1, 1]))
+
+    hill = gym.make("bench/Sensors-v0", task="MountainCar-v0", goal_only=True)
+    observation, _ = hill.reset(seed=1)
+    rewards, terminated = [], False
+    while not terminated:  # a push along the velocity reaches the goal
+        observation, reward, terminated, _, _ = hill.step(2 if observation[1] >= 0 else 0)
+        rewards.append(reward)
+    assert rewards == [0.0] * (len(rewards) - 1) + [1.0]
+
+
+def test_an_endless_task_has_episodes_in_evaluations_only(scripts):
+    spec = scripts.study.combinations["Pendulum endless", "q-lambda-auto"].spec
+    spec = quick(spec, "Pendulum").replace(budget=spec.budget.replace(steps=600))
+    trial = spec.replace(protocol=spec.protocol.replace(evaluate_every=600)).make_trial(1)
+    clock = scripts.studies.Clock(trial.training)
+    trial.training.run()
+    assert clock.curve["steps"] == [600]
+    rows = [row for row in trial.training.rows if row["kind"] == "episode"]
+    assert not rows, "training has no end"
+    assert -200 * 17 < clock.curve["mean_return"][0] < 0, "200 steps at most 16.3 each"
 
 
 def test_cells_end_in_the_opposite_corner_after_the_shortest_path_along_the_borders(scripts):
