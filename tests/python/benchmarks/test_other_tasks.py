@@ -78,7 +78,8 @@ def quick(spec, case):
 
 
 PHYSICS = {
-    "LunarLander", "LunarLanderContinuous", "InvertedPendulum", "Reacher", "Hopper", "HalfCheetah"
+    "LunarLander", "LunarLanderContinuous", "InvertedPendulum", "Reacher", "Hopper", "HalfCheetah",
+    "Walker2d", "Swimmer", "InvertedDoublePendulum",
 }  # fmt: skip
 """Cases that need Box2D or MuJoCo."""
 
@@ -99,7 +100,7 @@ def test_every_agent_of_the_study_learns_40_steps(scripts, monkeypatch):
         assert record.rows.table["kind"].tolist() == 3 * ["evaluation"]
         assert np.round(record.rows.episode_return, 2).tolist() == curve["mean_return"]
         assert curve["bytes"] > 0
-    assert len(tried) == 10, "the agents that need no other library"
+    assert len(tried) == 11, "the agents that need no other library"
 
 
 def test_a_stored_trial_is_not_run_again(scripts, tmp_path):
