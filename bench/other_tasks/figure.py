@@ -15,6 +15,8 @@ from sdnn.runs.report import require_matplotlib
 from sdnn.runs.study import Study
 from sdnn.support.files import write_whole
 
+ACTOR_CRITIC = "actor-critic"
+
 
 def draw(study: Study, results: Curves, path: Path) -> None:
     """Draw return against steps and against processor time, a column for each task."""
@@ -55,8 +57,8 @@ def draw_overview(study: Study, results: Curves, path: Path) -> None:
     require_matplotlib()
     from matplotlib.figure import Figure
 
-    names = [name for name in TASKS if (name, OURS) in results]
-    order = sorted(names, key=lambda name: score(name, results[name, OURS]))
+    ours = {name: results.get((name, OURS)) or results.get((name, ACTOR_CRITIC)) for name in TASKS}
+    order = sorted((n for n, trials in ours.items() if trials), key=lambda n: score(n, ours[n]))
     figure = Figure(figsize=(8.0, 0.6 + 0.33 * len(order)), layout="constrained")
     axes = figure.subplots()
     legend = {}
@@ -88,7 +90,7 @@ def _dot(variant: str) -> tuple[str, dict[str, Any]]:
     """Return the legend's text of an agent and the look of its dots."""
     if variant == OURS:
         return "SDNNQLambda", {"ms": 9, "color": COLORS[0], "zorder": 4}
-    if variant == "actor-critic":
+    if variant == ACTOR_CRITIC:
         return "SDNNActorCritic", {"ms": 7, "color": COLORS[1], "zorder": 3}
     return "others", {"ms": 5, "color": "0.6", "mec": "white", "mew": 0.5, "zorder": 2}
 

@@ -93,10 +93,10 @@ def _end_table(
 
 
 def _ours_rows(
-    results: Curves, tasks: Sequence[str], sensors: Iterable[str]
+    results: Curves, tasks: Sequence[str], changes: Iterable[str]
 ) -> Iterator[list[str]]:
-    """Our medians under each change of the sensors, a column for each task."""
-    for change in sensors:
+    """Our medians under each change, a column for each task."""
+    for change in changes:
         trials = [results.get((f"{task} {change}", OURS), ()) for task in tasks]
         yield [change, *(number(np.median(last_returns(t))) if t else "" for t in trials)]
 
@@ -172,13 +172,13 @@ def tables(study: Study, results: Curves) -> dict[str, str]:
     clean = [case for case in cases if parts_of(case)[1] == "clean"]
     changed = [case for case in cases if case not in clean]
     compared = [case for case in changed if any(k[0] == case and k[1] != OURS for k in results)]
-    tasks = list(dict.fromkeys(parts_of(case)[0] for case in changed))
-    sensors = dict.fromkeys(parts_of(case)[1] for case in changed if case not in compared)
+    alone = [parts_of(case) for case in changed if case not in compared]
+    tasks, changes = (list(dict.fromkeys(parts[i] for parts in alone)) for i in (0, 1))
     return {
         "goals": markdown(goals, _goal_rows(results)),
         "at the end": markdown(*_end_table(study, results, clean, ["task"])),
         "other sensors": markdown(*_end_table(study, results, compared, ["task", "change"])),
-        "ours, other sensors": markdown(["change", *tasks], _ours_rows(results, tasks, sensors)),
+        "ours, other sensors": markdown(["change", *tasks], _ours_rows(results, tasks, changes)),
         "losses": markdown(losses, _loss_rows(study, results)),
         "costs": markdown(("agent", "us a step", "KiB"), _cost_rows(study, results)),
     }
