@@ -19,6 +19,7 @@ from c_policies import run
 from sdnn import SDNNKernelClassifier, SDNNKernelRidge
 from sdnn.coding import Circular, RandomInverse, Symbolic, WithMissing
 from sdnn.estimators.input_choice import positions
+from sdnn.estimators.ridge import apply_degree
 from sdnn.export import export_estimator_header
 
 
@@ -85,7 +86,7 @@ def outputs_in_order(model, X):
     if len(inputs.directions):
         terms = positions(X, model.codings_)[:, None] * inputs.directions
         table = np.hstack([table, np.cumsum(terms, axis=2)[..., -1]])
-    kernel = model._kernel(table)
+    kernel = apply_degree(model.kernel_(table, model.X_fit_), model.degree_)
     terms = kernel[:, :, None] * model.dual_coef_
     return np.cumsum(terms, axis=1)[:, -1] + model.intercept_
 
