@@ -47,8 +47,10 @@ class Sensors(gym.ObservationWrapper):
         super().__init__(gym.wrappers.FlattenObservation(env))
         low, high = flat_bounds(env.observation_space)
         self._is_sensed = ~np.isin(np.arange(low.size), hidden)
-        low, high = (np.tile(one[self._is_sensed], 1 + copies) for one in (low, high))
-        first, last = (low, high) if ends is None else (np.tile(e, 1 + copies) for e in ends)
+        first, last = (low, high) if ends is None else np.asarray(ends)
+        low, high, first, last = (
+            np.tile(bound[self._is_sensed], 1 + copies) for bound in (low, high, first, last)
+        )
         self._deviation = noise * (last - first)
         if noise and not np.isfinite(self._deviation).all():
             raise ValueError("ends must be given of variables whose range is infinite")

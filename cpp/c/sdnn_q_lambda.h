@@ -50,7 +50,8 @@ typedef struct {
   uint8_t pending;    /* the code of the state of the pending transition */
   uint8_t is_pending; /* whether a transition is to be learned */
   uint8_t has_exponent;
-  uint8_t is_excursion;
+  uint8_t is_excursion;         /* whether n_kept counts steps of an excursion */
+  uint8_t skips_learning;       /* whether the last act was one, and its step is not learned yet */
   uint8_t is_live[SDNN_N_ROWS]; /* rows of traces that are not all 0 */
 } sdnn_agent;
 
@@ -161,7 +162,7 @@ static inline void sdnn_finish_at_end(sdnn_agent* agent) {
 static inline void sdnn_begin_episode(sdnn_agent* agent) {
   agent->step = 0;
   agent->n_kept = 0;
-  agent->is_excursion = 0;
+  agent->is_excursion = agent->skips_learning = 0;
   sdnn_forget(&agent->states);
   if (agent->is_pending) sdnn_finish_at_end(agent);
 }
@@ -178,6 +179,7 @@ static inline uint32_t sdnn_larger(uint32_t a, uint32_t b) { return a > b ? a : 
 #define SDNN_WORST 2  /* on an excursion from good states, which long episodes have */
 #define SDNN_MAKES_EXCURSIONS (SDNN_SEARCHES && !SDNN_IS_SARSA)
 #define SDNN_LONG_EPISODE 2000
+#define SDNN_MOST_STEPS (UINT32_C(1) << 30) /* then they are no longer counted */
 #define SDNN_DRAWS_FOR_EXCURSION 4
 
 /* Which action the next step takes. */
@@ -185,15 +187,19 @@ static inline int sdnn_kind_of_action(sdnn_agent* agent) {
   const uint32_t most = (uint32_t)SDNN_MAX_ACTION_REPEAT >> agent->n_ended;
   const uint32_t least = SDNN_MAX_ACTION_REPEAT < 5 ? SDNN_MAX_ACTION_REPEAT : 5;
   const uint32_t longest = sdnn_larger(most, least);
-  const uint32_t step = agent->step++;
+  const uint32_t step = agent->step;
   const int may_explore = sdnn_may_explore(step) && agent->epsilon > 0;
   const int is_left = agent->n_random_left > 0 && (SDNN_START_STEPS > 0 || may_explore);
   const int at_random = is_left || (sdnn_lacks_rewards(agent) && may_explore);
   uint32_t d;
+  if (step < SDNN_MOST_STEPS) ++agent->step;
+  agent->skips_learning = 0;
+  if (agent->is_excursion && !may_explore) agent->n_kept = 0;
   if (agent->n_kept == 0) agent->is_excursion = 0;
   if (is_left) --agent->n_random_left;
   if (agent->n_kept > 0) {
     --agent->n_kept;
+    agent->skips_learning = agent->is_excursion;
     return agent->is_excursion ? SDNN_WORST : SDNN_RANDOM;
   }
   if (!at_random && !(may_explore && sdnn_bits(&agent->randoms[SDNN_EXPLORATION]) >> 11 <
@@ -205,6 +211,7 @@ static inline int sdnn_kind_of_action(sdnn_agent* agent) {
     agent->is_excursion = !at_random && step >= SDNN_LONG_EPISODE &&
                           sdnn_below(repetitions, SDNN_DRAWS_FOR_EXCURSION) == 0;
     if (agent->is_excursion) {
+      agent->skips_learning = 1;
       agent->n_kept = (uint32_t)sdnn_below(repetitions, longest);
       return SDNN_WORST;
     }
@@ -298,14 +305,15 @@ static inline int64_t sdnn_q_of_each(const sdnn_agent* agent, const int32_t* obs
   return sdnn_sum(agent->weights, &code, limited);
 }
 
-/* Whether a transition is of the last step, which was one of an excursion. */
-static inline int sdnn_is_of_excursion(const sdnn_agent* agent, const uint32_t* action) {
+/* Whether the last step, of this action, was one of an excursion and is not learned. */
+static inline int sdnn_skips(sdnn_agent* agent, const uint32_t* action) {
+  const int skips = SDNN_MAKES_EXCURSIONS && agent->skips_learning;
   uint32_t d;
-  if (!SDNN_MAKES_EXCURSIONS || !agent->is_excursion) return 0;
-  for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
+  agent->skips_learning = 0;
+  for (d = 0; skips && d < SDNN_N_DIMENSIONS; ++d) {
     if (action[d] != agent->kept[d]) return 0;
   }
-  return 1;
+  return skips;
 }
 
 /* Makes the unit of values smaller at the end of a window of rewards, if it may be. */
@@ -315,8 +323,8 @@ static inline void sdnn_end_step(sdnn_agent* agent) {
 }
 
 /* Learns a transition, whose reward is times 2^SDNN_FRACTION_BITS. `terminated` says that nothing
- * follows it; running out of time is no such end. If the next transition begins elsewhere, this one
- * was the last of its episode. */
+ * follows it; running out of time is no such end. Other steps of excursions are not learned. If the
+ * next transition begins elsewhere, this one was the last of its episode. */
 static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observation,
                                       const uint32_t* action, int32_t reward,
                                       const int32_t* next_observation, int terminated) {
@@ -332,7 +340,7 @@ static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observat
     sdnn_read_next(&agent->states, limited, next_observation, bins);
     return;
   }
-  if (!terminated && sdnn_is_of_excursion(agent, limited)) {
+  if (sdnn_skips(agent, limited) && !terminated) {
     sdnn_end(agent);
     sdnn_read_next(&agent->states, limited, next_observation, agent->states.next_bins);
     sdnn_keep_next(&agent->states, next_observation);

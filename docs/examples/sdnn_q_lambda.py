@@ -107,7 +107,7 @@ class QLambda:
 
     def begin_episode(self):
         self.end_trace()
-        self.n_kept, self.n_steps, self.is_excursion = 0, 0, False
+        self.n_kept, self.n_steps, self.is_excursion, self.skips_learning = 0, 0, False, False
 
     def end_trace(self):
         self.trace[:], self.old_value, self.next_state = 0, 0, None
@@ -146,10 +146,12 @@ class QLambda:
             must_explore = self.n_random_left > 0 or self.lacks_rewards()
             self.n_random_left = max(self.n_random_left - 1, 0)
             self.n_steps += 1
-            self.is_excursion &= self.n_kept > 0
+            if self.is_excursion and (self.n_kept == 0 or self.epsilon() == 0):
+                self.n_kept, self.is_excursion = 0, False
+            self.skips_learning = self.is_excursion
             if self.n_kept > 0:
                 self.n_kept -= 1
-                return self.worst(state) if self.is_excursion else self.random_action
+                return self.worst(state) if self.is_excursion else self.kept_action
             if must_explore or self.exploration.uniform() < self.epsilon():
                 # (7) A random action is kept for at least k steps with probability 1 / k. Each
                 #     episode that terminates halves the longest duration, down to 5 steps.
@@ -158,16 +160,17 @@ class QLambda:
                 #     states: its steps take the worst action, and are not learned.
                 is_long = self.n_steps > 2000 and s.max_action_repeat > 1 and not must_explore
                 self.is_excursion = is_long and self.repetitions.below(4) == 0
+                self.skips_learning = self.is_excursion
                 if self.is_excursion:
                     self.n_kept = self.repetitions.below(longest)
                     return self.worst(state)
                 n_actions = np.diff(self.first_rows)
-                self.random_action = [self.exploration.below(int(n)) for n in n_actions]
+                self.kept_action = [self.exploration.below(int(n)) for n in n_actions]
                 if must_explore:
                     self.n_kept = self.repetitions.below(s.max_action_repeat // 2)
                 else:
                     self.n_kept = int(min(1 / (1 - self.repetitions.uniform()), longest)) - 1
-                return self.random_action
+                return self.kept_action
         # (9) Without exploration, actions follow an average of the weights.
         weights = self.average if not explore and self.n_snapshots > 0 else self.weights
         ties = self.ties if explore else self.greedy_ties
@@ -176,11 +179,13 @@ class QLambda:
 
     def worst(self, state):
         parts = self.sums(self.code(state), self.weights)
-        self.random_action = [int(part.argmin()) for part in parts]
-        return self.random_action
+        self.kept_action = [int(part.argmin()) for part in parts]
+        return self.kept_action
 
     def learn(self, state, action, reward, next_state, terminated):
-        if self.is_excursion and list(action) == self.random_action and not terminated:
+        skips = self.skips_learning and list(action) == self.kept_action and not terminated
+        self.skips_learning = False
+        if skips:
             self.end_trace()
             return
         x, next_x = self.code(state), self.code(next_state)

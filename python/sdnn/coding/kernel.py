@@ -156,9 +156,8 @@ class AnalyticKernel:
         self, of_inputs: Iterator[NDArray[np.float64]], total: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """Combine the correlations of each input to the kernel; ``total`` is a zeroed buffer."""
-        if (
-            self.has_all_pairs and len(self.codings) > 2
-        ):  # sum over nu != mu = sum over all - diagonal
+        if self.has_all_pairs and len(self.codings) > 2:
+            # The sum over nu != mu is that over all pairs without the diagonal.
             squares = np.zeros_like(total)
             for of_input in of_inputs:
                 total += of_input

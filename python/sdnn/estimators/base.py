@@ -7,7 +7,7 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from numbers import Real
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 from joblib import effective_n_jobs
@@ -153,7 +153,7 @@ class BaseSDNN(Fitted, CodedInputs):
     verbose: int = parameter(0, "verbose")
 
     refit = False  # the regressor lets its users choose it
-    _largest_full_sample: ClassVar[float] = math.inf
+    _largest_full_sample = math.inf
     """Size from which on `fit` halves the share of corrections, to average more noise."""
 
     @abc.abstractmethod
@@ -228,7 +228,7 @@ class BaseSDNN(Fitted, CodedInputs):
             # few epochs.
             n_epochs = min(max_iter, 2) if in_blocks else max_iter
             learned = self._targets_to_learn(bins[rows], targets[rows], weights_of_rows)
-            part = 0.5 if n_samples > self._largest_full_sample else 1.0
+            part = 0.5 if len(table) > self._largest_full_sample else 1.0
             trainer = self._trainer(bins[rows], learned, n_epochs, part)
             return trainer, run_epochs(
                 self, trainer, n_samples, max_iter, random, scored, times, n_averaged, in_blocks

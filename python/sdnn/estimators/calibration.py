@@ -58,6 +58,9 @@ def learn_without_fifth(
         pairs=[(mu, None if mu == nu else nu) for mu, nu in fitted.pairs_],
         n_pattern_units=fitted.network_.input_code.core.n_units,
     )
+    # The smaller network corrects as large a share of its errors.
+    if len(targets) > fitted._largest_full_sample:
+        model._largest_full_sample = 0
     kept, held = np.flatnonzero(~is_held), np.flatnonzero(is_held)
     weights_of_kept = None if sample_weight is None else weights[kept]
     model.fit(samples_in(X, kept), targets[kept], weights_of_kept)

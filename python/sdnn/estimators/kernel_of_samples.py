@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from sdnn import _core
@@ -12,7 +14,7 @@ from sdnn.estimators.columns import Array, Floats, Ints
 from sdnn.estimators.ridge import apply_degree, row_blocks
 
 LEAST_POWER = 1e-150  # smallest correlation that is computed from powers
-LARGEST_TABLE = 2000  # most bins of an input whose correlations are read from a table
+MOST_CORRELATIONS = 2000**2  # of all inputs, in tables
 
 
 class KernelOfSamples(InputBins):
@@ -26,9 +28,8 @@ class KernelOfSamples(InputBins):
         self._arguments = kernel, samples, degree
         self._core: _core.KernelSums | None = None
         self._with_pattern = [i for i, c in enumerate(self.codings) if isinstance(c, WithMissing)]
-        of_each = map(correlations_of, self.codings)
-        tables = [correlations for correlations in of_each if correlations is not None]
-        if kernel.has_all_pairs and len(tables) == len(self.codings):
+        tables = tables_of(self.codings) if kernel.has_all_pairs else None
+        if tables is not None:
             tables += [np.diag([0.0, 1.0])] * len(self._with_pattern)
             bins, n_inputs = self._core_bins(samples), len(self.codings)
             self._core = _core.KernelSums(tables, bins, n_inputs, degree)
@@ -59,19 +60,27 @@ class KernelOfSamples(InputBins):
         return np.concatenate(parts)
 
 
-def correlations_of(coding: Coding) -> Floats | None:
+def tables_of(codings: Sequence[Coding]) -> list[Floats] | None:
+    """Return the correlations of each input; None if they are too many."""
+    tables, n_correlations = [], 0
+    for coding in codings:
+        tables.append(correlations_of(coding))
+        n_correlations += tables[-1].size
+        if n_correlations > MOST_CORRELATIONS:
+            return None
+    return tables
+
+
+def correlations_of(coding: Coding) -> Floats:
     """Return correlations as the core takes them, without those of missing values.
 
-    They are those of the first bin, if they fall by a factor from bin to bin, or those of all bins;
-    None if these are too many.
+    They are those of the first bin, if they fall by a factor from bin to bin, or those of all bins.
     """
     base = coding.base if isinstance(coding, WithMissing) else coding
     matrix = base.correlations(N_UNITS)
     correlations = matrix
     if type(base) is RandomInverse and matrix[0].min() > LEAST_POWER:
         correlations = matrix[0]
-    elif len(matrix) > LARGEST_TABLE:
-        return None
     if not isinstance(coding, WithMissing):
         return correlations
     padding = [(0, 1)] * correlations.ndim  # a missing value correlates with no other

@@ -112,8 +112,8 @@ class BaseKernelRidge(CodedInputs):
     -----
     For m components, or m samples if these are fewer, `fit` takes ``48 m^2`` bytes, ``98304 m``
     more with low rank, 16 MB to choose inputs, `predict` with listed pairs ``65536 m``, and both
-    ``8 n_bins^2`` per different coding. Time grows with the cube of m, and beyond that with the
-    number of samples.
+    ``8 n_bins^2`` per different coding and at most 32 MB for all. Time grows with the cube of m,
+    and beyond that with the number of samples.
     """
 
     alpha: float | str = parameter("auto", Interval(Real, 0, np.inf, closed="neither"), AUTO)

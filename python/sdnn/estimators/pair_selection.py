@@ -6,6 +6,8 @@ decide which features it has.
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, clone, is_classifier
@@ -14,6 +16,7 @@ from sklearn.utils import _safe_indexing
 from sdnn.coding import Coding, CorrelationMatrix, Symbolic, WithMissing
 from sdnn.coding.symbols import present
 from sdnn.estimators.columns import Array, Floats, Pairs, input_pairs
+from sdnn.estimators.outliers import OutlierWarning
 from sdnn.estimators.training import FEWEST_SAMPLES, held_out_fifth
 
 PART = 5000  # samples that decide, of larger samples
@@ -87,6 +90,9 @@ def select_pairs_with_part(
     n_units = min(MOST_UNITS, max(FEWEST_UNITS, 2 * round(COLUMNS_OF_PART / n_pairs / 2)))
     model.set_params(n_pattern_units=n_units, max_iter=EPOCHS_OF_PART)
     weights_of_part = None if weights is None else weights[rows]
-    return select_pairs(
-        model, _safe_indexing(X, rows), np.asarray(y)[rows], weights_of_part, n_features, seed
-    )
+    targets = np.asarray(y)[rows]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", OutlierWarning)  # the whole sample warns of its outliers
+        return select_pairs(
+            model, _safe_indexing(X, rows), targets, weights_of_part, n_features, seed
+        )

@@ -159,5 +159,5 @@ class QLambdaLearner(Learner[_core.LinearSDNN], QLambdaWriter):
         n_bytes = 8 * 3 + 24 + 32 * 4 + 4 * (2 + self.averages) * n_weights + 4 * 10
         n_bytes += 4 * 2 * self.n_dimensions
         n_bytes = self.with_states(n_bytes, 4 * self.n_inputs, next_bins=True)
-        n_bytes += 2 * self.code_bytes() + 4 + sum(self.n_rows())
+        n_bytes += 2 * self.code_bytes() + 5 + sum(self.n_rows())
         return rounded_up(n_bytes, 8)

@@ -174,9 +174,9 @@ def warn_of_endless_episode(n_steps: int) -> None:
     """Warn that an episode has had a number of steps and continues."""
     warnings.warn(
         f"an episode has had {n_steps:,} steps and continues. If the task can begin anew, end"
-        " episodes by a time limit (max_episode_steps): but for SDNNQLambda, which leaves good states"
-        " at times, an agent that stays in a few states learns little of all others, and a greedy"
-        " episode may never end",
+        " episodes by a time limit (max_episode_steps): an agent that stays in a few states learns"
+        " little of all others, unless it makes excursions like SDNNQLambda, and a greedy episode"
+        " may never end",
         RuntimeWarning,
         stacklevel=3,
     )

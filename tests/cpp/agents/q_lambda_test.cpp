@@ -216,6 +216,7 @@ int longest_action(QLambda agent, int n_ended) {
   Indices last;
   int longest = 0, n = 0;
   for (int i = 0; i < 5000; ++i) {
+    if (i % 1000 == 0) agent.begin_episode();  // long episodes have excursions
     const auto span = agent.act(state);
     const Indices action(span.begin(), span.end());
     n = action == last ? n + 1 : 1;  // of 250^2 actions, two successive ones are hardly ever equal
@@ -234,6 +235,32 @@ TEST(QLambda, EveryEndOfAnEpisodeHalvesTheLongestRandomActionDownToFiveSteps) {
   EXPECT_EQ(longest_action(agent(100), 7), 5);
   EXPECT_EQ(longest_action(agent(100), 40), 5);
   EXPECT_EQ(longest_action(agent(3), 7), 3);
+}
+
+TEST(QLambda, StepsOfExcursionsAreTheWorstOnesAndAreLearnedOnlyIfTheyTerminate) {
+  QLambda agent = agent_of({.max_action_repeat = 20}, {5}, 2);
+  learn_at_random(agent, 100, 2);
+  agent.set_epsilon(1.0);
+  agent.begin_episode();
+  const State state{0.3, 0.6};
+  auto workspace = agent.workspace();
+  int n_left_out = 0;
+  for (int i = 0; i < 4000; ++i) {
+    const auto span = agent.act(state);
+    const Indices action(span.begin(), span.end());
+    const QLambda before = agent;
+    agent.learn(state, action, 1.0, state, false);
+    if (agent.n_learned() > before.n_learned()) continue;
+    ++n_left_out;
+    EXPECT_GE(i, 2000);
+    const auto values = agent.values(state, workspace);
+    EXPECT_EQ(values[action[0]], std::ranges::min(values));
+    QLambda ended = before;
+    ended.learn(state, action, 1.0, state, true);
+    EXPECT_EQ(ended.n_learned(), before.n_learned() + 1);
+  }
+  EXPECT_GT(n_left_out, 500);
+  EXPECT_LT(n_left_out, 1500);
 }
 
 TEST(QLambda, RefusesStatesWithAnImpossibleNumberOfEndedEpisodes) {

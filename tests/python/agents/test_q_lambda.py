@@ -88,6 +88,66 @@ def test_excursions_of_an_endless_episode_are_those_of_the_numpy_transcription()
     assert 100 < n_excursions < 900  # of 1,000 steps
 
 
+def excursions_of(agent):
+    """The names of what is saved of excursions."""
+    return [name for name in agent.state() if name.endswith(("is_excursion", "skips_learning"))]
+
+
+@pytest.mark.parametrize("when", ["before learning", "after learning"])
+def test_excursions_resume_exactly_and_take_allowed_actions(when, tmp_path):
+    # Two environments, with masks at random.
+    def new_agent():
+        space = gym.spaces.Box(-1.0, 1.0, (2,))
+        learning = QLambdaConfig(epsilon=0.5)
+        agent = SDNNQLambda(
+            space, gym.spaces.MultiDiscrete([3, 2]), learning=learning, warm_up_steps=50, seed=1
+        )
+        agent.n_environments = 2
+        return agent
+
+    def lived(agent, cuts):
+        n_in_excursions = 0
+        for step in range(4400):
+            rng, i = np.random.default_rng(step), step % 2
+            observation, following = rng.uniform(-1, 1, (2, 2))
+            mask = np.append(rng.permutation([1, 1, 0]), [1, 1]).astype(np.int8)
+            action = agent.act(observation, environment=i, mask=mask)
+            assert mask[action[0]]
+            transition = Transition(observation, action, rng.normal(), following, False)
+            if when == "after learning":
+                agent.learn(transition, environment=i)
+            if step in cuts:
+                n_in_excursions += len(excursions_of(agent)) > 0
+                agent.save(tmp_path / "agent.safetensors")
+                agent = load_agent(tmp_path / "agent.safetensors")
+            if when == "before learning":
+                agent.learn(transition, environment=i)
+        return agent, n_in_excursions
+
+    resumed, n_in_excursions = lived(new_agent(), range(4200, 4400, 10))
+    assert n_in_excursions > 3
+    assert states_equal(lived(new_agent(), ())[0], resumed)
+
+
+def test_a_step_that_the_agent_did_not_take_is_learned_after_an_excursion():
+    agent = SDNNQLambda(
+        gym.spaces.Box(-1.0, 1.0, (2,)), gym.spaces.Discrete(2), seed=1,
+        learning=QLambdaConfig(epsilon=0.5), warm_up_steps=50,
+    )  # fmt: skip
+    rng = np.random.default_rng(0)
+    for _ in range(2100):
+        observation, following = rng.uniform(-1, 1, (2, 2))
+        action = agent.act(observation)
+        agent.learn(Transition(observation, action, rng.normal(), following, False))
+    while not excursions_of(agent):
+        action = agent.act(observation)
+    agent.learn(Transition(observation, action, 1.0, following, False))
+    for other in (0, 1):
+        before = agent.readout.weights()
+        agent.learn(Transition(observation, other, 5.0, following, False))
+        assert (agent.readout.weights() != before).any()
+
+
 def test_a_few_discrete_states_have_exact_independent_values(tmp_path):
     space = gym.spaces.Discrete(5, start=3)
     agent = SDNNQLambda(space, gym.spaces.Discrete(2), seed=1)

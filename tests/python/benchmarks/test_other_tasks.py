@@ -263,6 +263,8 @@ def test_wrappers_hide_variables_delay_actions_and_leave_the_goals_reward(script
     usual = gym.make("CartPole-v1")
     shown = rollout(gym.make("bench/Sensors-v0", task="CartPole-v1", hidden=[1, 3]), [1, 1, 0])
     assert np.array_equal(shown, np.array(rollout(usual, [1, 1, 0]))[:, [0, 2]])
+    noisy = gym.make("bench/Sensors-v0", task="CartPole-v1", hidden=[1, 3], noise=0.05)
+    assert 0.01 < np.abs(np.subtract(rollout(noisy, [1, 1, 0]), shown)).max() < 1
     late = rollout(gym.make("bench/Sensors-v0", task="CartPole-v1", delay=2), [1, 1, 0, 0])
     assert np.array_equal(late, rollout(usual, [0, 0, 1, 1]))
 

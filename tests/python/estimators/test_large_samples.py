@@ -6,6 +6,7 @@ import pytest
 from sdnn import SDNNClassifier, SDNNRegressor, _core
 from sdnn.coding import RandomInverse
 from sdnn.estimators import base, training
+from sdnn.estimators.outliers import OutlierWarning
 
 X = np.random.RandomState(0).uniform(size=(1300, 3))
 Y = np.sin(5 * X[:, 0]) * X[:, 1] + X[:, 2]
@@ -72,6 +73,26 @@ def test_a_part_of_many_samples_selects_the_features(make):
     assert model.score(samples, y) > every.score(samples, y) - 0.02
     few = make(**options).fit(samples[:1000], y[:1000])
     assert len(few.pairs_) == 132
+
+
+@pytest.mark.usefixtures("few_are_many")
+def test_an_outlier_is_warned_of_once():
+    samples = X.copy()
+    samples[5, 0] = 1e6
+    with pytest.warns(OutlierWarning) as warned:
+        SDNNRegressor(**{**OPTIONS, "n_pattern_units": None}).fit(samples, Y)
+    assert len(warned) == 1
+
+
+@pytest.mark.parametrize("options", [{"early_stopping": True, "refit": True}, {"calibrate": True}])
+def test_networks_that_learn_with_fewer_samples_are_corrected_by_half_too(options, monkeypatch):
+    half = SDNNRegressor(**OPTIONS, **options, correction_share=0.5).fit(X, Y)
+    monkeypatch.setattr(SDNNRegressor, "_largest_full_sample", len(X) - 1)
+    beyond = SDNNRegressor(**OPTIONS, **options).fit(X, Y)
+    np.testing.assert_array_equal(beyond.weights_, half.weights_)
+    if "calibrate" in options:
+        expected = half.predict_interval(X[:5])
+        np.testing.assert_array_equal(beyond.predict_interval(X[:5]), expected)
 
 
 def test_very_many_samples_are_corrected_by_half(monkeypatch):

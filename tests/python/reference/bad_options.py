@@ -58,7 +58,7 @@ LEFT_OUT = {"bench"}
 
 @functools.cache
 def run_folder():
-    """A run that is done, in a folder that lasts as long as the process."""
+    """A run that is done, which each process makes once."""
     run = os.path.join(tempfile.mkdtemp(), "run")
     settings = ["n_pattern_units=20", "n_hidden_units=60", "n_active_units=20"]
     options = [word for setting in settings for word in ("--set", f"approximator.{setting}")]

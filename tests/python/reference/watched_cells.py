@@ -7,6 +7,7 @@ import sys
 import tempfile
 import time
 import warnings
+from multiprocessing import forkserver
 
 CELL_SECONDS = 30.0 * (6 if "ASAN_OPTIONS" in os.environ else 1)
 """Limit of processor time. Cells take 10 s, fifteen times as long under sanitizers as without;
@@ -26,13 +27,21 @@ def failures(make_cells, *arguments):
     that ends, or is ended after `HANG_SECONDS` without a word, is followed by another one.
     """
     context = multiprocessing.get_context("forkserver")
-    # The server imports what cells use, once; it takes its search path from the environment.
-    os.environ["PYTHONPATH"] = os.pathsep.join(dict.fromkeys(filter(None, sys.path)))
+    # The server imports what cells use, once. It begins with this environment and search path;
+    # its processes take the environment of their own time.
     context.set_forkserver_preload([make_cells.__module__])
+    environment, former_path = dict(os.environ), os.environ.get("PYTHONPATH")
+    os.environ["PYTHONPATH"] = os.pathsep.join(dict.fromkeys(filter(None, sys.path)))
+    forkserver.ensure_running()
+    if former_path is None:
+        del os.environ["PYTHONPATH"]
+    else:
+        os.environ["PYTHONPATH"] = former_path
     failed, first, n_cells = [], 0, None
     while n_cells is None or first < n_cells:
         here, there = context.Pipe(duplex=False)
-        worker = context.Process(target=_work, args=(there, first, make_cells, arguments))
+        work = there, environment, first, make_cells, arguments
+        worker = context.Process(target=_work, args=work)
         worker.start()
         there.close()
         name, fault = "the start", None
@@ -60,7 +69,9 @@ def _received(pipe, seconds):
     return pipe.recv()
 
 
-def _work(pipe, first, make_cells, arguments):
+def _work(pipe, environment, first, make_cells, arguments):
+    os.environ.clear()
+    os.environ.update(environment)
     home = os.getcwd()
     cells = list(make_cells(*arguments))
     with open("/proc/self/statm") as file:

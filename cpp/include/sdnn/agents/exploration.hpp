@@ -51,13 +51,14 @@ class Exploration {
   struct Episode {
     std::vector<std::size_t> kept;  ///< the random action, or the last one of the excursion
     int n_kept = 0;                 ///< steps that it, or the excursion, will still last
-    bool is_excursion = false;      ///< whether the last action was one of an excursion
+    bool is_excursion = false;      ///< whether these are steps of an excursion
+    bool skips_learning = false;  ///< whether the last act was one, and its step is not learned yet
     int step = 0;
 
     void begin() noexcept {
       step = 0;
       n_kept = 0;
-      is_excursion = false;
+      is_excursion = skips_learning = false;
     }
   };
 
@@ -90,28 +91,33 @@ class Exploration {
   /// Returns which action the next step takes. A random one is written to episode.kept: an index
   /// below n_actions(d) in each dimension d, allowed by `mask`. A repeated action ends early if it
   /// is no longer allowed. `lacks_order` means that no action is known to be better than another;
-  /// every step is random then. `may_leave` permits excursions.
+  /// every step is random then. `makes_excursions` permits them.
   template <class NActions>
   Choice choose(Episode& episode, const NActions& n_actions, ActionMask mask = {},
-                bool lacks_order = false, bool may_leave = false) {
+                bool lacks_order = false, bool makes_excursions = false) {
+    const int step = episode.step;
+    if (step < kMostSteps) ++episode.step;
+    episode.skips_learning = false;
+    if (episode.is_excursion && !policy_.may_explore(step)) episode.n_kept = 0;
     if (episode.n_kept == 0) episode.is_excursion = false;
     ActionMask left = mask;
     for (std::size_t d = 0; d < episode.kept.size() && !left.empty(); ++d) {
       const bool is_allowed = allows(take_part(left, n_actions(d)), episode.kept[d]);
       if (!is_allowed && !episode.is_excursion) episode.n_kept = 0;
     }
-    const int step = episode.step++;
     const bool at_random = n_random_left_ > 0 && (start_steps_ > 0 || policy_.may_explore(step));
     if (at_random) --n_random_left_;
     const bool must_explore = at_random || (lacks_order && policy_.may_explore(step));
     if (episode.n_kept == 0 && !must_explore && !policy_.explores(step)) return Choice::best;
     if (episode.n_kept > 0) {
       --episode.n_kept;
+      episode.skips_learning = episode.is_excursion;
       return episode.is_excursion ? Choice::worst : Choice::random;
     }
-    episode.is_excursion = may_leave && !must_explore && step >= kLongEpisode &&
+    episode.is_excursion = makes_excursions && !must_explore && step >= kLongEpisode &&
                            repetitions_.below(kDrawsForExcursion) == 0;
     if (episode.is_excursion) {
+      episode.skips_learning = true;
       episode.n_kept = static_cast<int>(repetitions_.below(static_cast<std::uint64_t>(longest())));
       return Choice::worst;
     }
@@ -158,9 +164,11 @@ class Exploration {
     std::vector<std::int64_t> kept(episode.kept.begin(), episode.kept.end());
     archive.numbers("kept_action", kept);
     archive.number("n_kept", episode.n_kept);
-    std::optional<bool> is_excursion;  // absent otherwise
+    std::optional<bool> is_excursion, skips_learning;  // absent otherwise
     if (episode.is_excursion) is_excursion = true;
+    if (episode.skips_learning) skips_learning = true;
     archive.number("is_excursion", is_excursion);
+    archive.number("skips_learning", skips_learning);
     if constexpr (Archive::kReads) {
       archive.expect(kept.size() == episode.kept.size(), "kept_action", "one per dimension");
       for (std::size_t d = 0; d < kept.size(); ++d) {
@@ -169,6 +177,7 @@ class Exploration {
         episode.kept[d] = static_cast<std::size_t>(kept[d]);
       }
       episode.is_excursion = is_excursion.value_or(false);
+      episode.skips_learning = skips_learning.value_or(false);
       archive.expect(episode.step >= 0, "step", "0 or more");
       archive.expect(episode.n_kept >= 0 && episode.n_kept < max_action_repeat_, "n_kept",
                      "in [0, max_action_repeat)");
@@ -178,6 +187,7 @@ class Exploration {
  private:
   static constexpr int kShort = 5;
   static constexpr int kLongEpisode = 2000;
+  static constexpr int kMostSteps = 1 << 30;  // then they are no longer counted
   static constexpr std::uint64_t kDrawsForExcursion = 4;
   static constexpr int kMostEnded = 20;  // beyond any max_action_repeat
 
@@ -212,9 +222,7 @@ inline constexpr double kLargestReward = 1e300;
 /// - best_of_read(workspace, ties, mask): a best action in the state that was read last.
 /// An epsilon-greedy agent has `exploration_`, a member `exploration` in each episode, and
 /// - read_to_explore(state, episode): reads a state into workspace_ for exploring actions;
-/// - worst_of_read(workspace, mask), lacks_rewards() and may_leave(), if it searches and leaves
-/// good
-///   states.
+/// - worst_of_read(workspace, mask), lacks_rewards() and makes_excursions(), if it makes any.
 /// Any other agent hides epsilon, explore and evaluation_ties.
 template <class Agent>
 class IndexAgent : public WithRates<Agent> {
@@ -278,7 +286,7 @@ class IndexAgent : public WithRates<Agent> {
     auto choice = Exploration::Choice::best;
     if constexpr (requires { own.worst_of_read(own.workspace_, mask); }) {
       choice = exploration.choose(episode.exploration, n_actions_of(), mask, own.lacks_rewards(),
-                                  own.may_leave());
+                                  own.makes_excursions());
     } else {
       choice = exploration.choose(episode.exploration, n_actions_of(), mask);
     }

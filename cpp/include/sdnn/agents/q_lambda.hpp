@@ -141,7 +141,7 @@ class QLambda : public IndexAgent<QLambda> {
     require_transition(state, action, reward, next_state, next_mask);
     require_duration(dt);
     Episode& episode = episodes_.of(environment);
-    if (!terminated && is_of_excursion(episode, action)) {
+    if (skips(episode.exploration, action) && !terminated) {
       end(episode);
       return;
     }
@@ -266,7 +266,7 @@ class QLambda : public IndexAgent<QLambda> {
   }
   /// Whether long episodes have excursions. With Sarsa they would be a part of the policy that is
   /// valued, and with discrete states only they would never become rare.
-  bool may_leave() const noexcept {
+  bool makes_excursions() const noexcept {
     return config_.max_action_repeat > 1 && config_.bootstrap == Bootstrap::q_learning &&
            !has_symbols_only();
   }
@@ -343,9 +343,10 @@ class QLambda : public IndexAgent<QLambda> {
     return workspace.action;
   }
 
-  static bool is_of_excursion(const Episode& episode, Action action) {
-    const Exploration::Episode& exploration = episode.exploration;
-    return exploration.is_excursion && std::ranges::equal(action, exploration.kept);
+  /// Returns whether the last step, of this action, was one of an excursion and is not learned.
+  static bool skips(Exploration::Episode& exploration, Action action) {
+    return std::exchange(exploration.skips_learning, false) &&
+           std::ranges::equal(action, exploration.kept);
   }
 
   /// Returns the allowed action of the lowest value in the state that was read last, the first of
