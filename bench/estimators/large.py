@@ -85,18 +85,18 @@ def measure(problem, n_rows, seed):
             if not fits[name] or min(fits[name]) < LONG_FIT_S:
                 fitted[name] = make(seed)
                 fits[name].append(seconds(lambda name=name: fitted[name].fit(X, y)))
-    one, many = ({name: [] for name in models} for _ in range(2))
+    single, many = ({name: [] for name in models} for _ in range(2))
     queries = X_test[:N_QUERIES]
     for turn in range(MOST_TURNS):
         for name, model in fitted.items():
             row = queries[turn : turn + 1]
-            one[name].append(seconds(lambda m=model, row=row: m.predict(row), n=50))
+            single[name].append(seconds(lambda m=model, row=row: m.predict(row), n=50))
             many[name].append(seconds(lambda m=model: m.predict(queries)) / len(queries))
     return {
         name: {
             "r2": round(float(model.score(X_test, y_test)), 5),
             "fit_s": float(f"{np.median(fits[name]):.4g}"),
-            "one_us": float(f"{1e6 * np.median(one[name]):.4g}"),
+            "one_us": float(f"{1e6 * np.median(single[name]):.4g}"),
             "many_us": float(f"{1e6 * np.median(many[name]):.4g}"),
         }
         for name, model in fitted.items()
@@ -133,8 +133,8 @@ def fit_table(results, problem):
         exponent = np.log(fit_s[-1] / fit_s[2]) / np.log(SIZES[-1] / SIZES[2])
         r2 = [f"{x:.3f}" for x in middles(results, problem, model, "r2")]
         ratios = middles(results, problem, model, "fit_s", "gradient boosting")
-        told = [f"{x:.2g}" if x < 10 else f"{x:.0f}" for x in ratios]
-        rows.append((model, *r2, *told, f"{exponent:.1f}"))
+        texts = [f"{x:.2g}" if x < 10 else f"{x:.0f}" for x in ratios]
+        rows.append((model, *r2, *texts, f"{exponent:.1f}"))
     return markdown(header, rows)
 
 

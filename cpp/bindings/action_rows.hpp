@@ -49,7 +49,9 @@ class ActionRows {
       auto* const row = static_cast<decltype(zero)*>(array_.mutable_data()) + n_columns_ * i;
       for (std::size_t d = 0; d < n_columns_; ++d) row[d] = static_cast<decltype(zero)>(numbers[d]);
     });
-    if (!is_written) array_.attr("reshape")(-1, n_columns_)[pybind11::int_(i)] = array_of(numbers);
+    if (is_written) return;
+    const pybind11::object row = array_[pybind11::int_(i)];
+    array_[pybind11::int_(i)] = array_of(numbers).attr("reshape")(row.attr("shape"));
   }
 
  private:

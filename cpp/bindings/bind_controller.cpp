@@ -316,6 +316,8 @@ void bind_controller(py::module_& module) {
           "act_each",
           [](Controller& self, const ArrayArgument<double>& observations,
              const py::list& environments, const py::object& actions, const MaskArgument& masks) {
+            core::require(py::isinstance<py::array>(actions), "actions",
+                          "an array, which is written to", "something else");
             bindings::ActionRows rows(actions, self.n_dimensions());
             for (const py::handle environment : environments) {
               const auto i = environment.cast<std::size_t>();

@@ -289,7 +289,7 @@ class BaseSDNN(Fitted, CodedInputs):
             code = work.network_.input_code
             row = work._row(x, code)
             work._note_inputs(row[None])
-            bins = code.bins_of_row(row)
+            bins = code.bins(row[None])
         else:
             self._validate_to_begin()
             table = work._first_row(x)
@@ -309,7 +309,7 @@ class BaseSDNN(Fitted, CodedInputs):
         n_networks: int = 1,
         is_large: bool = False,
     ) -> np.random.RandomState:
-        """Fit the codings, draw tables and weights; return the generator for orders of samples."""
+        """Fit the codings, draw tables and weights; return the generator that shuffles samples."""
         n_units = self._set_outputs(y)
         codings = self._codings(X, table)
         random: np.random.RandomState = check_random_state(self.random_state)
@@ -330,11 +330,11 @@ class BaseSDNN(Fitted, CodedInputs):
         return random
 
     def _resume(self, table: Array, y: Array) -> np.random.RandomState:
-        """Prepare a copy of the network to train on; return the generator for orders of samples."""
+        """Prepare a copy of the network to train on; return the generator that shuffles samples."""
         self._check_outputs(y, None)
         network = self.network_
         n_networks, code = self._n_networks(len(table)), network.input_code
-        if n_networks > 1:
+        if n_networks > 1:  # `_begin` has checked the memory of a single one
             limit, n_units = self.memory_limit, network.n_units
             require_memory(limit, n_units, n_networks, code.core.n_units, code.codings, code.pairs)
         self._note_inputs(table)
@@ -429,7 +429,7 @@ class BaseSDNN(Fitted, CodedInputs):
     def _bins_of_one(self, x: Sample) -> Ints:
         """Return the bins of a sample to predict, without the overhead of a table."""
         code = self._fitted_network.input_code
-        return code.bins_of_row(self._row(x, code))
+        return code.bins(self._row(x, code)[None])
 
     def transform_code(self, X: ArrayLike) -> NDArray[np.int8]:
         """Return the code of samples: +1, 0, -1, shape (n_samples, n_pairs * n_pattern_units)."""

@@ -33,10 +33,6 @@ class InputBins:
                 raise ValueError(f"{error} in column {index}") from None
         return bins
 
-    def bins_of_row(self, row: Array) -> Ints:
-        """Return the bins of one sample, shape (1, n used inputs)."""
-        return self.bins(row[None])
-
     @functools.cached_property
     def _even(self) -> tuple[slice | Ints, Floats, Floats, Floats, Ints] | None:
         """Inputs, low, high, half widths and n_bins for `_even_bins`; None for uneven bins."""
@@ -60,8 +56,6 @@ class InputBins:
         inside = np.minimum(np.maximum(values, low), high)
         positions = (inside / 2 - low / 2) / half_width  # as in `sdnn.coding.numeric`
         is_missing = values != values
-        if not is_missing.any():
-            return np.minimum((positions * sizes).astype(np.int32), sizes - 1)
         positions[is_missing] = 0
         bins: Ints = np.minimum((positions * sizes).astype(np.int32), sizes - 1)
         return np.where(is_missing, sizes, bins)

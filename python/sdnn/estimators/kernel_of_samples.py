@@ -20,7 +20,8 @@ MOST_CORRELATIONS = 2000**2  # of all inputs, in tables
 class KernelOfSamples(InputBins):
     """A kernel of a degree, between samples, shape (n_samples, n_inputs), and others.
 
-    The core computes it for all pairs of inputs, to about 15 digits, numpy for listed pairs.
+    The core computes it for all pairs of inputs, to about 15 digits; NumPy does for listed pairs,
+    and where tables of correlations would take more than 32 MB.
     """
 
     def __init__(self, kernel: AnalyticKernel, samples: Array, degree: int) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from numbers import Real
 
 import numpy as np
@@ -193,35 +194,55 @@ class BaseKernelRidge(CodedInputs):
         is_exact = len(components) == len(table)
         # With low rank, half of the components choose inputs and degree, in an eighth of the time.
         for rows in [components] if is_exact else [components[::2], components]:
-            part, least = samples[rows], math.inf
-            for inputs in possible:
-                kernel, values = self._kernel_of(inputs, table)
-                base = kernel(values[rows])
-                solutions, models = {}, {}
-                for degree in degrees:
-                    problem = diagonal(apply_degree(base.copy(), degree), part)
-                    solutions[degree] = solve(problem, part, alpha)
-                    if models_errors:
-                        errors = log_sizes(part.targets - solutions[degree].left_out)
-                        model = solve_for(problem, part, errors)
-                        models[degree] = dataclasses.replace(model, rows=rows)
-                    del problem  # free its memory before the next degree needs as much
-                best = min(solutions, key=lambda degree: solutions[degree].error)
-                loss = float(part.weights @ self._losses(part, solutions[best].left_out))
-                if loss < least or inputs is possible[0]:
-                    least, solution, sizes = loss, solutions[best], models.get(best)
-                    self._inputs, self.kernel_, self.degree_ = inputs, kernel, best
-                    self.X_fit_ = values[rows]
+            part = samples[rows]
+            solution, sizes = self._choose(
+                possible, degrees, table, rows, part, alpha, models_errors=models_errors
+            )
             possible, degrees = [self._inputs], (self.degree_,)
         self._of_samples = KernelOfSamples(self.kernel_, self.X_fit_, self.degree_)
         if not is_exact:
-            del base
             table, kernel_of = self._inputs.of(table, codings), self._of_samples.matrix
             problem = low_rank_diagonal(lambda rows: kernel_of(table[rows]), components, samples)
             solution = solve(problem, samples, alpha)
         self.alpha_, self.leave_one_out_error_ = solution.alpha, solution.error
         self.dual_coef_, self.intercept_ = solution.dual, solution.intercept
         return solution.left_out, solution.rows, sizes
+
+    def _choose(
+        self,
+        possible: Sequence[Inputs],
+        degrees: Sequence[int],
+        table: Array,
+        rows: Rows,
+        part: Samples,
+        alpha: float | None,
+        *,
+        models_errors: bool,
+    ) -> tuple[Solution, Solution | None]:
+        """Choose inputs and degree by the errors of models without a sample; ``part`` has the rows.
+
+        Returns the solution, and with `models_errors` that of the logarithms of the errors' sizes.
+        """
+        least = math.inf
+        for inputs in possible:
+            kernel, values = self._kernel_of(inputs, table)
+            base = kernel(values[rows])
+            solutions, models = {}, {}
+            for degree in degrees:
+                problem = diagonal(apply_degree(base.copy(), degree), part)
+                solutions[degree] = solve(problem, part, alpha)
+                if models_errors:
+                    errors = log_sizes(part.targets - solutions[degree].left_out)
+                    model = solve_for(problem, part, errors)
+                    models[degree] = dataclasses.replace(model, rows=rows)
+                del problem  # free its memory before the next degree needs as much
+            best = min(solutions, key=lambda degree: solutions[degree].error)
+            loss = float(part.weights @ self._losses(part, solutions[best].left_out))
+            if loss < least or inputs is possible[0]:
+                least, solution, sizes = loss, solutions[best], models.get(best)
+                self._inputs, self.kernel_, self.degree_ = inputs, kernel, best
+                self.X_fit_ = values[rows]
+        return solution, sizes
 
     def _kernel_of(self, inputs: Inputs, table: Array) -> tuple[AnalyticKernel, Array]:
         """Return the kernel of inputs and the inputs of samples, from all their features."""

@@ -35,10 +35,11 @@ namespace sdnn::agents {
 /// 2. A rare reward usually takes many steps in the same direction.
 ///
 /// In an episode without an end an agent would stay in good states and learn little of all others.
-/// After kLongEpisode steps of an episode, every fourth of the draws above begins an excursion
-/// instead, of a uniform length up to the longest at present: its steps take the worst action, and
-/// are not learned unless they terminate. (Learned, they raise the values of all actions: errors of
-/// the best values are corrected only where best actions are taken.)
+/// After kLongEpisode steps of an episode a draw above begins an excursion instead, with
+/// probability 1 / kDrawsForExcursion and a uniform length up to the longest at present. Its steps
+/// take the worst action, and are not learned unless they terminate. (Learned, they raise the
+/// values of all actions: errors of the best values are corrected only where best actions are
+/// taken.)
 ///
 /// In its first start_steps steps an agent takes random actions only, so that it finds a rare
 /// success before greedy actions have learned to avoid effort. Source: the start_steps of Achiam,

@@ -132,16 +132,18 @@ class QLambda : public IndexAgent<QLambda> {
 
   /// Learns one transition of dt usual steps; with Sarsa it is pending until the next action is
   /// known, unless it terminated. Steps of excursions are not learned, see Exploration. `next_mask`
-  /// restricts the actions of the next state. Throws
-  /// std::invalid_argument for a reward that is not finite or beyond +- 1e300, an impossible dt, or
-  /// an environment that does not exist; then nothing has been learned.
+  /// restricts the actions of the next state. Throws std::invalid_argument for a reward that is not
+  /// finite or beyond +- 1e300, an impossible dt, or an environment that does not exist; then
+  /// nothing has been learned.
   void learn(std::span<const double> state, Action action, double reward,
              std::span<const double> next_state, bool terminated, std::size_t environment = 0,
              ActionMask next_mask = {}, double dt = 1.0) {
     require_transition(state, action, reward, next_state, next_mask);
     require_duration(dt);
     Episode& episode = episodes_.of(environment);
-    if (skips(episode.exploration, action) && !terminated) {
+    const bool skips = std::exchange(episode.exploration.skips_learning, false) &&
+                       std::ranges::equal(action, episode.exploration.kept);
+    if (skips && !terminated) {
       end(episode);
       return;
     }
@@ -341,12 +343,6 @@ class QLambda : public IndexAgent<QLambda> {
       workspace.action[d] = policy.best_action(row, best_value(row) - whole, ties);
     }
     return workspace.action;
-  }
-
-  /// Returns whether the last step, of this action, was one of an excursion and is not learned.
-  static bool skips(Exploration::Episode& exploration, Action action) {
-    return std::exchange(exploration.skips_learning, false) &&
-           std::ranges::equal(action, exploration.kept);
   }
 
   /// Returns the allowed action of the lowest value in the state that was read last, the first of
