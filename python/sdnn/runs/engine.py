@@ -222,7 +222,9 @@ def run_trials(
             if finished:
                 with store.together():
                     add(finished)
-        except StoreError:  # of one trial: those before it are stored
+        except (
+            StoreError
+        ):  # nothing of the batch is stored: keep what comes before the faulty trial
             add(finished)
         n_run += len(finished)
 

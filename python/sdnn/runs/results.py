@@ -277,9 +277,9 @@ def records_of(results: Iterable[CaseResult]) -> tuple[TrialRecord, ...]:
 
 
 def on_equal_terms(name: MeasureName, *measured: TrialMeasures) -> tuple[FloatArray, ...]:
-    """Return a measure of each group's trials, all censored at the end of the shortest trials.
+    """Return a measure of the trials of each group, as if all had ended with the shortest trial.
 
-    Otherwise groups would seem to differ where one only has longer trials.
+    Otherwise groups would seem to differ where those of one are only longer.
     """
     last_episode = min(result.last_episode for result in measured)
     return tuple(result.uncensored(name, last_episode) for result in measured)

@@ -41,9 +41,10 @@ MAX_BYTES = 2**34
 MOST_EMPTY_ARRAYS = 1024
 """Number of arrays that a file may have in addition to one per two bytes of content."""
 
+_LENGTH_BYTES = 8
 _BEGINNING = b'{"__metadata__":{"sdnn":"{\\"checksum\\":\\"'
-"""Start of the header; 8 bytes with the header's length precede it."""
-_CHECKSUM = slice(8 + len(_BEGINNING), 16 + len(_BEGINNING))
+"""Start of the header, behind the bytes that hold the header's length."""
+_CHECKSUM = slice(_LENGTH_BYTES + len(_BEGINNING), _LENGTH_BYTES + len(_BEGINNING) + 8)
 
 _TYPES = ("BOOL", "I8", "I16", "I32", "I64", "U8", "U16", "U32", "U64", "F16", "F32", "F64")
 """Types of arrays, as safetensors names them: those of NumPy."""
@@ -215,7 +216,7 @@ def remove_abandoned_files(folder: Path) -> None:
 
 
 def write_file(
-    path: Path, content: str, arrays: Mapping[str, Array], description: Mapping[str, object]
+    path: Path, kind: str, arrays: Mapping[str, Array], description: Mapping[str, object]
 ) -> None:
     """Write a file of an ``"agent"``, ``"training"`` or ``"estimator"``, whole or not at all.
 
@@ -225,16 +226,16 @@ def write_file(
     from safetensors.numpy import save
 
     about = {
-        "checksum": "00000000",
+        "checksum": "00000000",  # its place, replaced below
         "description": description,
         "format": FORMAT,
-        "kind": content,
+        "kind": kind,
         "version": __version__,
     }
     text = json.dumps(about, sort_keys=True, separators=(",", ":"))
     contiguous = {name: np.asarray(array, order="C") for name, array in arrays.items()}
     data = memoryview(save(contiguous, metadata={"sdnn": text}))
-    if data[8 : _CHECKSUM.start] != _BEGINNING:
+    if data[_LENGTH_BYTES : _CHECKSUM.start] != _BEGINNING:
         raise RuntimeError("not saved: this version of safetensors orders its header otherwise")
     before, after = data[: _CHECKSUM.start], data[_CHECKSUM.stop :]
     write_whole(path, [before, _checksum(data), after])
@@ -250,14 +251,14 @@ def read_file(path: Path, *contents: str) -> tuple[Description, Arrays]:
     from safetensors.numpy import load
 
     with open_regular(path, MAX_BYTES) as file:
-        if file.read(_CHECKSUM.start)[8:] != _BEGINNING:
+        if file.read(_CHECKSUM.start)[_LENGTH_BYTES:] != _BEGINNING:
             raise ValueError(f"{path} is not a file of sdnn, or is damaged")
         file.seek(0)
         data = file.read(os.fstat(file.fileno()).st_size)
     if data[_CHECKSUM] != _checksum(memoryview(data)):
         raise ValueError(f"{path} is damaged: its checksum does not fit its content")
-    end = 8 + int.from_bytes(data[:8], "little")
-    n_arrays, n_bytes = data.count(b'"dtype"', 8, end), max(len(data) - end, 0)
+    end = _LENGTH_BYTES + int.from_bytes(data[:_LENGTH_BYTES], "little")
+    n_arrays, n_bytes = data.count(b'"dtype"', _LENGTH_BYTES, end), max(len(data) - end, 0)
     if n_arrays > MOST_EMPTY_ARRAYS + n_bytes // 2:
         raise ValueError(f"{path} is damaged: it has {n_arrays} arrays in {n_bytes} bytes")
     try:

@@ -68,12 +68,12 @@ def _version_of(package: str) -> str:
 
 
 def instruction_set() -> str:
-    """Return the level in use.
+    """Return the vector instruction set in use, such as ``avx2``.
 
     Raises
     ------
     ValueError
-        If the environment variable names a level that does not exist, or not on this processor.
+        If SDNN_INSTRUCTION_SET names one that does not exist, or that this processor lacks.
     """
     try:
         return _core.instruction_set()

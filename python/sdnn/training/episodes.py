@@ -322,7 +322,7 @@ class Episodes:
         return i, self.adapter.terminated[i] or self.adapter.truncated[i]
 
     def _reset(self, numbers: Mapping[int, int]) -> dict[int, Element]:
-        """Reset environments for the episodes of these numbers; return the first observations."""
+        """Reset environments (keys) for episodes of these numbers; return first observations."""
         seeds = {
             i: None if self._seed is None else episode_seed(self._seed, _LEARNING, number)
             for i, number in numbers.items()

@@ -164,7 +164,7 @@ class Advised:
                     for field in fields_of(getattr(kind, f"{part}_type"))
                 }
                 elsewhere |= {known: known for known in dir(kind) if not known.startswith("_")}
-                del elsewhere["progress"]  # of learning, where others show a bar
+                del elsewhere["progress"]  # where others show a progress bar, it is a schedule's
                 if hint := advice(name, (), elsewhere):
                     raise AttributeError(f"{kind.__name__} has no {name}: {hint}")
             return object.__getattribute__(self, name)  # raises its own error

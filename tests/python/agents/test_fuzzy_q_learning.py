@@ -16,7 +16,7 @@ def test_fuzzy_q_learning_refuses_an_action_that_was_modified():
     here = [0.1, 0.2, 0.3]
     action = agent.act(here)
     copy = action.copy()
-    action[0] = 0.5 * (action[0] + 3.0)
+    action[0] = 0.5 * (action[0] + TORQUES.high[0])  # another one within the space
     refuses("action", agent.learn, Transition(here, action, 1.0, here, False))
     agent.learn(Transition(here, copy, 1.0, here, False))
     assert agent.value(here) > 0.0

@@ -16,7 +16,7 @@ from sdnn.agents import (
 from sdnn.agents.imitation import _value
 from stopped_training import states_equal
 
-RANDOM_STEPS = 1100
+STEPS_BEYOND_WARM_UP = 1100
 """More than the steps of a warm-up."""
 
 
@@ -48,7 +48,7 @@ def noisy():
 def test_history_auto_selects_what_a_task_needs(agent_class, task, history):
     agent = agent_class(task(), seed=1, angle_pairs="find")
     assert agent.history == "auto"
-    agent.train(task(), steps=RANDOM_STEPS, seed=1)
+    agent.train(task(), steps=STEPS_BEYOND_WARM_UP, seed=1)
     assert agent.history == history
     n_inputs = len(agent.inputs) * (2 if history == "differences" else 1)
     assert agent.approximator.n_inputs == n_inputs
@@ -58,7 +58,7 @@ def test_history_auto_selects_what_a_task_needs(agent_class, task, history):
 @pytest.mark.parametrize("task", ["Acrobot-v1", "Pendulum-v1", "MountainCar-v0"])
 def test_auto_finds_no_history_where_observations_show_the_state(agent_class, task):
     agent = agent_class(gym.make(task), seed=1004, angle_pairs="find")
-    agent.train(gym.make(task), steps=RANDOM_STEPS, seed=1004)
+    agent.train(gym.make(task), steps=STEPS_BEYOND_WARM_UP, seed=1004)
     assert agent.history == "none"
 
 
@@ -66,7 +66,7 @@ def test_auto_finds_no_history_where_observations_show_the_state(agent_class, ta
 def test_auto_finds_no_history_in_the_task_of_the_paper(seed):
     """Products of three variables, which the model lacks, are neither noise nor velocities."""
     agent = SDNNQLambda(gym.make("sdnn/PaperAcrobot-v0"), seed=seed)
-    agent.train(gym.make("sdnn/PaperAcrobot-v0"), steps=RANDOM_STEPS, seed=seed)
+    agent.train(gym.make("sdnn/PaperAcrobot-v0"), steps=STEPS_BEYOND_WARM_UP, seed=seed)
     assert agent.history == "none"
 
 
@@ -80,8 +80,8 @@ def test_an_actor_critic_that_knows_angles_finds_an_observer_for_a_noisy_pendulu
         )
 
     agent = SDNNActorCritic(pendulum(), seed=1, angle_pairs="find")
-    agent.train(pendulum(), steps=RANDOM_STEPS, seed=1)
-    assert (agent.history, len(agent.inputs)) == ("observer", 2)
+    agent.train(pendulum(), steps=STEPS_BEYOND_WARM_UP, seed=1)
+    assert (agent.history, len(agent.inputs)) == ("observer", 2)  # the angle and its velocity
 
 
 @pytest.mark.parametrize("agent_class", [SDNNQLambda, SDNNActorCritic])
@@ -133,7 +133,7 @@ def test_an_agent_that_finds_no_history_learns_the_bits_of_one_without(settings)
 @pytest.mark.parametrize("history", ["differences", "averages", "observer"])
 def test_a_loaded_agent_with_a_history_acts_and_learns_as_the_saved_one(history, tmp_path):
     agent = SDNNQLambda(positions(), seed=1, history=history)
-    agent.train(positions(), steps=RANDOM_STEPS, seed=1)
+    agent.train(positions(), steps=STEPS_BEYOND_WARM_UP, seed=1)
     agent.save(tmp_path / "agent.safetensors")
     same = load_agent(tmp_path / "agent.safetensors")
     assert same.history == history
@@ -145,7 +145,7 @@ def test_a_loaded_agent_with_a_history_acts_and_learns_as_the_saved_one(history,
 def test_evaluations_do_not_change_the_history_of_the_current_episode():
     agents = [SDNNQLambda(positions(), seed=1, history="differences") for _ in range(2)]
     for agent in agents:
-        agent.train(positions(), steps=RANDOM_STEPS, seed=1)
+        agent.train(positions(), steps=STEPS_BEYOND_WARM_UP, seed=1)
         agent.begin_episode()
         agent.act(positions().reset(seed=3)[0])
     evaluate(agents[0], positions(), episodes=2, seed=1)
@@ -166,7 +166,7 @@ def test_environments_of_a_vector_have_separate_histories():
 def test_the_value_after_a_truncated_log_is_that_of_its_own_episode():
     # It does not depend on the episode that was imitated before.
     agent = SDNNQLambda(positions(), seed=1, history="differences")
-    agent.train(positions(), steps=RANDOM_STEPS, seed=1)
+    agent.train(positions(), steps=STEPS_BEYOND_WARM_UP, seed=1)
     first, second = ([Transition([x, 0.0], 0, 1.0, [x + 0.1, 0.0], False)] for x in (-2.0, 1.0))
     values = []
     for earlier in ([], first):

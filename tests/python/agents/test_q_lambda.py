@@ -109,11 +109,11 @@ def test_excursions_resume_exactly_and_take_allowed_actions(when, tmp_path):
         n_in_excursions = 0
         for step in range(4400):
             rng, i = np.random.default_rng(step), step % 2
-            observation, following = rng.uniform(-1, 1, (2, 2))
+            observation, next_observation = rng.uniform(-1, 1, (2, 2))
             mask = np.append(rng.permutation([1, 1, 0]), [1, 1]).astype(np.int8)
             action = agent.act(observation, environment=i, mask=mask)
             assert mask[action[0]]
-            transition = Transition(observation, action, rng.normal(), following, False)
+            transition = Transition(observation, action, rng.normal(), next_observation, False)
             if when == "after learning":
                 agent.learn(transition, environment=i)
             if step in cuts:
@@ -136,15 +136,15 @@ def test_a_step_that_the_agent_did_not_take_is_learned_after_an_excursion():
     )  # fmt: skip
     rng = np.random.default_rng(0)
     for _ in range(2100):
-        observation, following = rng.uniform(-1, 1, (2, 2))
+        observation, next_observation = rng.uniform(-1, 1, (2, 2))
         action = agent.act(observation)
-        agent.learn(Transition(observation, action, rng.normal(), following, False))
+        agent.learn(Transition(observation, action, rng.normal(), next_observation, False))
     while not excursions_of(agent):
         action = agent.act(observation)
-    agent.learn(Transition(observation, action, 1.0, following, False))
+    agent.learn(Transition(observation, action, 1.0, next_observation, False))
     for other in (0, 1):
         before = agent.readout.weights()
-        agent.learn(Transition(observation, other, 5.0, following, False))
+        agent.learn(Transition(observation, other, 5.0, next_observation, False))
         assert (agent.readout.weights() != before).any()
 
 

@@ -186,8 +186,8 @@ class StateCode {
     return result;
   }
 
-  /// The groups in the order of the paired code: paired groups first, then groups without a
-  /// partner.
+  /// The code of all groups. First come those in pairs, which have the same modifier, and then
+  /// those without a partner: the order of the paired code.
   SelectiveDesensitization make_code() const {
     core::require(permutations_.size() == n_groups(), "number of permutations",
                   "n_inputs times the number of strides", permutations_.size());

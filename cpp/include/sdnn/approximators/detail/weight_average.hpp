@@ -18,13 +18,13 @@ namespace sdnn::approximators {
 
 /// A moving average of weights and thresholds whose window grows with the number of corrections.
 ///
-/// After n corrections the weights after correction t count by about (t / n)^7: the average forgets
-/// early weights and smooths late oscillations. A unit then has the most frequent sign of its
-/// recent potentials, so a value is near the median of its recent values. Snapshots are taken every
-/// `interval` corrections, later every n / 64, and move the average by a power of two of the way,
-/// about 8 / n times the corrections in between. All numbers are integers, so equal corrections
-/// give equal bits. Weights have two bytes, of which 14 bits are for fractions of a step of the
-/// lattice, or fewer if a weight needs more bits for whole steps.
+/// After n corrections the weights after correction t have a weight of about (t / n)^7: the average
+/// forgets early weights and smooths late oscillations. A unit then has the sign of the mean of its
+/// recent potentials. A snapshot is taken every `interval` corrections, later every n / 64. It
+/// moves the average by 2^-k of the way to the weights, about 8 / n times the corrections since the
+/// last. All numbers are integers, so equal corrections give equal bits. Weights have two bytes, of
+/// which 14 bits are for fractions of a step of the lattice, or fewer if a weight needs more bits
+/// for whole steps.
 ///
 /// Source: Polyak, B., Juditsky, A. (1992). Acceleration of stochastic approximation by averaging;
 /// Shamir, O., Zhang, T. (2013). Stochastic gradient descent for non-smooth optimization, section
