@@ -73,7 +73,7 @@ class SoftmaxPolicy {
       for (; row < n_rows_ && row - first < kAtOnce; ++row) {
         rows[row - first] = &weights_[row * n_columns_];
       }
-      approximators::row_sums(rows, row - first, code.masks(), n_columns_,
+      approximators::row_sums(rows, row - first, code.signs().data(), n_columns_,
                               &workspace.preferences[first]);
     }
   }
@@ -147,8 +147,8 @@ class SoftmaxPolicy {
         row_step.correction = static_cast<std::int32_t>(approximators::scaled(
             std::int64_t{term.entropy_slope} * step.entropy, rate, 60 - n_unit_bits_));
         std::int32_t* const weights = &weights_[row * n_columns_];
-        const approximators::RowUse use =
-            approximators::learn_row(weights, trace.row(row), code.masks(), n_columns_, row_step);
+        const approximators::RowUse use = approximators::learn_row(
+            weights, trace.row(row), code.signs().data(), n_columns_, row_step);
         trace.set_live(row, use.traces != 0);
         if (use.weights >= approximators::kLargestWeight - 1) clip(weights);
       }

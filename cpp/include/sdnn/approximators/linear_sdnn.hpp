@@ -117,8 +117,7 @@ class LinearSDNN {
 
   Workspace workspace() const {
     Workspace workspace;
-    workspace.code_.active_.resize(n_slots());
-    workspace.code_.negative_.resize(n_slots());
+    workspace.code_.signs_.resize(n_slots());
     workspace.words_.resize(2 * code_->n_words());
     workspace.new_bins_.resize(n_inputs());
     workspace.row_sums_.resize(n_rows_);
@@ -146,13 +145,10 @@ class LinearSDNN {
     std::size_t n_active = 0;
     for (std::size_t w = 0; w < code_->n_words(); ++w) {
       n_active += static_cast<std::size_t>(std::popcount(active[w]));
-      positive[w] = active[w] & ~positive[w];
     }
     Code& code = workspace.code_;
-    spread_bits(active, code_->n_words(), code.active_.data());
-    spread_bits(positive, code_->n_words(), code.negative_.data());
-    n_active += thermometers_.write(workspace.bins_, code.active_.data() + 64 * code_->n_words(),
-                                    code.negative_.data() + 64 * code_->n_words());
+    spread_signs(active, positive, code_->n_words(), code.signs_.data());
+    n_active += thermometers_.write(workspace.bins_, code.signs_.data() + 64 * code_->n_words());
     code.n_active_ = static_cast<std::int32_t>(n_active);
   }
 
@@ -315,7 +311,7 @@ class LinearSDNN {
         row_step.replace = is_active && !step.is_dutch ? -1 : 0;
         row_step.correction = is_active ? correction : 0;
         const RowUse use = learn_row(&weights_[row * n_slots()], &trace.values_[row * n_slots()],
-                                     code.masks(), n_slots(), row_step);
+                                     code.signs().data(), n_slots(), row_step);
         trace.live_[row] = use.traces != 0;
         if (is_active || trace.live_[row]) versions_[row] = version_;
         used |= use.weights;
@@ -382,7 +378,7 @@ class LinearSDNN {
 
   std::int64_t sum_of_row(const std::vector<std::int32_t>& rows, std::size_t row,
                           const Code& code) const noexcept {
-    return row_sum(&rows[row * n_slots()], code.masks(), n_slots());
+    return row_sum(&rows[row * n_slots()], code.signs().data(), n_slots());
   }
   /// Updates the sums of rows that have changed from first to end, or those of the average.
   void sum_rows(std::size_t first, std::size_t end, bool averaged,
@@ -400,7 +396,7 @@ class LinearSDNN {
         rows[n++] = &weights[row * n_slots()];
         workspace.versions_[row] = averaged ? 0 : versions_[row];
       }
-      row_sums(rows, n, workspace.code_.masks(), n_slots(), sums);
+      row_sums(rows, n, workspace.code_.signs_.data(), n_slots(), sums);
       for (std::size_t i = 0; i < n; ++i) workspace.row_sums_[places[i]] = sums[i];
     }
   }

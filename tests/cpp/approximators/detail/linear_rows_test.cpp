@@ -14,8 +14,8 @@ namespace sdnn::approximators {
 namespace {
 
 struct Rows {
-  std::vector<std::int32_t> weights, traces, active, negative;
-  CodeMasks code() const { return {active.data(), negative.data()}; }
+  std::vector<std::int32_t> weights, traces;
+  std::vector<std::int8_t> signs;
 };
 
 Rows random_rows(std::size_t n, std::uint64_t seed) {
@@ -25,9 +25,8 @@ Rows random_rows(std::size_t n, std::uint64_t seed) {
     rows.weights.push_back(static_cast<std::int32_t>(random.below((1 << 24) - 1)) - (1 << 23) + 1);
     rows.traces.push_back(static_cast<std::int32_t>(random.below(2 * kLargestTrace + 1)) -
                           kLargestTrace);
-    const bool active = random.below(2) == 1;
-    rows.active.push_back(active ? -1 : 0);
-    rows.negative.push_back(active && random.below(2) == 1 ? -1 : 0);
+    const bool is_active = random.below(2) == 1;
+    rows.signs.push_back(!is_active ? 0 : random.below(2) == 1 ? -1 : 1);
   }
   return rows;
 }
@@ -37,21 +36,31 @@ TEST(LinearRows, SumsOfTheLargestWeightsAreExactOnEveryInstructionSet) {
     Rows rows = random_rows(n, n);
     std::int64_t expected = 0;
     for (std::size_t j = 0; j < n; ++j) {
-      if (rows.active[j] != 0)
-        expected += rows.negative[j] != 0 ? -rows.weights[j] : rows.weights[j];
+      if (rows.signs[j] != 0) expected += rows.signs[j] < 0 ? -rows.weights[j] : rows.weights[j];
     }
-    Rows full = rows;
-    for (std::size_t j = 0; j < n; ++j) {
-      full.weights[j] = (1 << 23) - 1;
-      full.active[j] = -1;
-      full.negative[j] = 0;
-    }
+    const std::vector<std::int32_t> largest(n, (1 << 23) - 1);
+    const std::vector<std::int8_t> ones(n, 1);
     testing::on_every_instruction_set([&](auto) {
-      EXPECT_EQ(row_sum(rows.weights.data(), rows.code(), n), expected);
-      EXPECT_EQ(row_sum(full.weights.data(), full.code(), n),
+      EXPECT_EQ(row_sum(rows.weights.data(), rows.signs.data(), n), expected);
+      EXPECT_EQ(row_sum(largest.data(), ones.data(), n),
                 static_cast<std::int64_t>(n) * ((1 << 23) - 1));
     });
   }
+}
+
+TEST(LinearRows, SignsAreThoseOfTheActiveColumns) {
+  const std::uint64_t active[] = {0b1011, ~std::uint64_t{0}};
+  const std::uint64_t positive[] = {0b0110, std::uint64_t{1} << 63};
+  std::vector<std::int8_t> expected(128, -1);
+  std::fill_n(expected.begin() + 4, 60, 0);
+  expected[1] = 1;
+  expected[2] = 0;
+  expected[127] = 1;
+  testing::on_every_instruction_set([&](auto) {
+    std::vector<std::int8_t> signs(128, 5);
+    spread_signs(active, positive, 2, signs.data());
+    EXPECT_EQ(signs, expected);
+  });
 }
 
 TEST(LinearRows, SumsOfManyRowsEqualThoseOfSingleRows) {
@@ -62,12 +71,12 @@ TEST(LinearRows, SumsOfManyRowsEqualThoseOfSingleRows) {
   for (std::uint64_t i = 0; i < 11; ++i) {
     rows.push_back(random_rows(320, i + 2));
     pointers.push_back(rows.back().weights.data());
-    expected.push_back(row_sum(pointers.back(), code.code(), 320));
+    expected.push_back(row_sum(pointers.back(), code.signs.data(), 320));
   }
   testing::on_every_instruction_set([&](auto) {
     for (std::size_t n = 0; n <= pointers.size(); ++n) {
       std::vector<std::int64_t> sums(n);
-      row_sums(pointers.data(), n, code.code(), 320, sums.data());
+      row_sums(pointers.data(), n, code.signs.data(), 320, sums.data());
       EXPECT_TRUE(std::equal(sums.begin(), sums.end(), expected.begin()));
     }
   });
@@ -76,15 +85,14 @@ TEST(LinearRows, SumsOfManyRowsEqualThoseOfSingleRows) {
 TEST(LinearRows, AStepOfTracesAndWeightsIsAsWorkedByHand) {
   // Traces are halved towards 0 and increased by the code +1, -1, 0, where 4096 is kTraceOne.
   std::vector<std::int32_t> weights{100, 100, 100}, traces{3, -3, 4096};
-  const std::vector<std::int32_t> active{-1, -1, 0}, negative{0, -1, 0};
+  const std::vector<std::int8_t> signs{1, -1, 0};
   const RowStep step{.decay = kDecayOne / 2,
                      .gain = kTraceOne,
                      .replace = 0,
                      .step = 5,
                      .shift = 12,
                      .correction = 2};
-  const RowUse use =
-      learn_row(weights.data(), traces.data(), {active.data(), negative.data()}, 3, step);
+  const RowUse use = learn_row(weights.data(), traces.data(), signs.data(), 3, step);
   EXPECT_EQ(traces, (std::vector<std::int32_t>{4097, -4097, 2048}));
   // 100 + round(5 * 4097 / 4096) - 2; 100 + round(-5.001) + 2; 100 + round(2.5), halves up
   EXPECT_EQ(weights, (std::vector<std::int32_t>{103, 97, 103}));
@@ -94,8 +102,8 @@ TEST(LinearRows, AStepOfTracesAndWeightsIsAsWorkedByHand) {
 
 TEST(LinearRows, AReplacingTraceIsOverwrittenWhereTheCodeIsActive) {
   std::vector<std::int32_t> weights{0, 0}, traces{9000, 9000};
-  const std::vector<std::int32_t> active{-1, 0}, negative{-1, 0};
-  learn_row(weights.data(), traces.data(), {active.data(), negative.data()}, 2,
+  const std::vector<std::int8_t> signs{-1, 0};
+  learn_row(weights.data(), traces.data(), signs.data(), 2,
             {.decay = kDecayOne,
              .gain = kTraceOne,
              .replace = -1,
@@ -105,18 +113,39 @@ TEST(LinearRows, AReplacingTraceIsOverwrittenWhereTheCodeIsActive) {
   EXPECT_EQ(traces, (std::vector<std::int32_t>{-kTraceOne, 9000}));
 }
 
+TEST(LinearRows, ACorrectionIsSubtractedTimesTheCode) {
+  const Rows rows = random_rows(320, 3);
+  RowStep step{.decay = 7000, .gain = 900, .replace = -1, .step = -77, .shift = 9, .correction = 0};
+  testing::on_every_instruction_set([&](auto) {
+    Rows quick = rows, corrected = rows;
+    const RowUse use = detail::learn_row_portable(quick.weights.data(), quick.traces.data(),
+                                                  rows.signs.data(), 320, step);
+    step.correction = 3;
+    learn_row(corrected.weights.data(), corrected.traces.data(), rows.signs.data(), 320, step);
+    step.correction = 0;
+    EXPECT_NE(use.traces, 0);
+    EXPECT_EQ(quick.traces, corrected.traces);
+    for (std::size_t j = 0; j < 320; ++j) {
+      EXPECT_EQ(corrected.weights[j], quick.weights[j] - 3 * rows.signs[j]);
+    }
+    Rows other = rows;
+    learn_row(other.weights.data(), other.traces.data(), rows.signs.data(), 320, step);
+    EXPECT_EQ(other.weights, quick.weights);
+  });
+}
+
 TEST(LinearRows, TracesDecayToZeroAndStayWithinTheirLimit) {
   std::vector<std::int32_t> weights{0, 0}, traces{kLargestTrace, -kLargestTrace};
-  const std::vector<std::int32_t> active{-1, -1}, negative{0, -1};
+  const std::vector<std::int8_t> signs{1, -1};
   RowStep step{
       .decay = kDecayOne, .gain = kTraceOne, .replace = 0, .step = 0, .shift = 1, .correction = 0};
-  const CodeMasks code{active.data(), negative.data()};
-  learn_row(weights.data(), traces.data(), code, 2, step);
+  learn_row(weights.data(), traces.data(), signs.data(), 2, step);
   EXPECT_EQ(traces, (std::vector<std::int32_t>{kLargestTrace, -kLargestTrace}));
   step.gain = 0;
   step.decay = kDecayOne * 9 / 10;
   int n = 0;
-  while (learn_row(weights.data(), traces.data(), code, 2, step).traces != 0) ASSERT_LT(++n, 1000);
+  while (learn_row(weights.data(), traces.data(), signs.data(), 2, step).traces != 0)
+    ASSERT_LT(++n, 1000);
   EXPECT_EQ(traces, (std::vector<std::int32_t>{0, 0}));
 }
 

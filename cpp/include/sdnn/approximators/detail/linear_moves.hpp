@@ -40,13 +40,13 @@ inline int LinearSDNN::move_rows(const Code& code, std::span<const std::int64_t>
   }
   ++version_;
   std::int32_t used = 0;
-  const CodeMasks masks = code.masks();
+  const std::int8_t* const signs = code.signs().data();
   for (std::size_t row = 0; row < n_rows_; ++row) {
     const auto step = static_cast<std::int32_t>(steps[row]);
     if (step == 0) continue;
     std::int32_t* const weights = &weights_[row * n_slots()];
     for (std::size_t j = 0; j < n_slots(); ++j) {
-      weights[j] += times_code(step, masks.active[j], masks.negative[j]);
+      weights[j] += step * signs[j];
       used |= weights[j] ^ (weights[j] >> 31);
     }
     versions_[row] = version_;

@@ -8,17 +8,12 @@
 #include <cstdlib>
 #include <vector>
 
+#include "sdnn/coding/detail/expanded_bits.hpp"
 #include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/core/detail/kernel.hpp"
 #include "sdnn/core/detail/lanes.hpp"
 
 namespace sdnn::approximators {
-
-/// A code as two masks per column, all bits or none: whether it is not 0, and whether it is -1.
-struct CodeMasks {
-  const std::int32_t* active;
-  const std::int32_t* negative;
-};
 
 /// The change of a row and its trace, in fixed-point numbers whose products fit into 32 bits.
 struct RowStep {
@@ -40,12 +35,6 @@ struct RowUse {
 inline constexpr std::int32_t kTraceOne = 1 << 12;
 inline constexpr std::int32_t kLargestTrace = (1 << 17) - 1;
 inline constexpr std::int32_t kDecayOne = 1 << 13;
-
-/// Returns x, 0 or -x.
-SDNN_INLINE std::int32_t times_code(std::int32_t x, std::int32_t active,
-                                    std::int32_t negative) noexcept {
-  return ((x & active) ^ negative) - negative;
-}
 
 /// Returns a * b / 2^n_bits, rounded to the nearest integer, halves up.
 constexpr std::int64_t scaled(std::int64_t a, std::int64_t b, int n_bits) noexcept {
@@ -75,11 +64,8 @@ constexpr std::int32_t multiplied(std::int32_t weight, int n) noexcept {
 
 namespace detail {
 
-/// The number of rows that are summed in a pass over the code.
-inline constexpr std::size_t kRowsAtOnce = 4;
-
 template <std::size_t kRows>
-SDNN_INLINE void sum_rows_at_once(const std::int32_t* const* rows, CodeMasks code,
+SDNN_INLINE void sum_rows_at_once(const std::int32_t* const* rows, const std::int8_t* signs,
                                   std::size_t n_columns, std::int64_t* sums) noexcept {
   constexpr std::size_t kBlock = 256;  // columns whose sum fits into 32 bits
   std::fill_n(sums, kRows, 0);
@@ -87,40 +73,38 @@ SDNN_INLINE void sum_rows_at_once(const std::int32_t* const* rows, CodeMasks cod
     const std::size_t last = std::min(n_columns, first + kBlock);
     std::int32_t of_block[kRows] = {};
     for (std::size_t j = first; j < last; ++j) {
-      const std::int32_t active = code.active[j];
-      const std::int32_t negative = code.negative[j];
-      for (std::size_t i = 0; i < kRows; ++i) {
-        of_block[i] += times_code(rows[i][j], active, negative);
-      }
+      const std::int32_t sign = signs[j];
+      for (std::size_t i = 0; i < kRows; ++i) of_block[i] += rows[i][j] * sign;
     }
     for (std::size_t i = 0; i < kRows; ++i) sums[i] += of_block[i];
   }
 }
 
-SDNN_INLINE void row_sums_body(const std::int32_t* const* rows, std::size_t n_rows, CodeMasks code,
-                               std::size_t n_columns, std::int64_t* sums) noexcept {
+SDNN_INLINE void row_sums_body(const std::int32_t* const* rows, std::size_t n_rows,
+                               const std::int8_t* signs, std::size_t n_columns,
+                               std::int64_t* sums) noexcept {
   std::size_t i = 0;
-  for (; i + kRowsAtOnce <= n_rows; i += kRowsAtOnce) {
-    sum_rows_at_once<kRowsAtOnce>(rows + i, code, n_columns, sums + i);
-  }
-  for (; i < n_rows; ++i) sum_rows_at_once<1>(rows + i, code, n_columns, sums + i);
+  for (; i + 4 <= n_rows; i += 4) sum_rows_at_once<4>(rows + i, signs, n_columns, sums + i);
+  for (; i + 2 <= n_rows; i += 2) sum_rows_at_once<2>(rows + i, signs, n_columns, sums + i);
+  if (i < n_rows) sum_rows_at_once<1>(rows + i, signs, n_columns, sums + i);
 }
 
-SDNN_INLINE RowUse learn_row_body(std::int32_t* weights, std::int32_t* traces, CodeMasks code,
-                                  std::size_t n_columns, RowStep step) noexcept {
+template <bool kCorrects>
+SDNN_INLINE RowUse learn_columns(std::int32_t* weights, std::int32_t* traces,
+                                 const std::int8_t* signs, std::size_t n_columns,
+                                 RowStep step) noexcept {
   const std::int32_t half = std::int32_t{1} << (step.shift - 1);
   std::int32_t traces_used = 0;
   std::int32_t weights_used = 0;
   for (std::size_t j = 0; j < n_columns; ++j) {
-    const std::int32_t active = code.active[j];
-    const std::int32_t negative = code.negative[j];
+    const std::int32_t sign = signs[j];
     const std::int32_t product = traces[j] * step.decay;
     std::int32_t trace = (product + ((product >> 31) & (kDecayOne - 1))) >> 13;  // towards 0
-    trace = (trace & ~(active & step.replace)) + times_code(step.gain, active, negative);
+    trace = ((sign & step.replace) != 0 ? 0 : trace) + step.gain * sign;
     trace = std::clamp(trace, -kLargestTrace, kLargestTrace);
     traces[j] = trace;
     std::int32_t weight = weights[j] + ((step.step * trace + half) >> step.shift);
-    weight -= times_code(step.correction, active, negative);
+    if constexpr (kCorrects) weight -= step.correction * sign;
     weights[j] = weight;
     traces_used |= trace;
     weights_used |= weight ^ (weight >> 31);
@@ -128,44 +112,49 @@ SDNN_INLINE RowUse learn_row_body(std::int32_t* weights, std::int32_t* traces, C
   return {traces_used, weights_used};
 }
 
-SDNN_INLINE void spread_bits_body(const std::uint64_t* words, std::size_t n_words,
-                                  std::int32_t* masks) noexcept {
+SDNN_INLINE RowUse learn_row_body(std::int32_t* weights, std::int32_t* traces,
+                                  const std::int8_t* signs, std::size_t n_columns,
+                                  RowStep step) noexcept {
+  return step.correction == 0 ? learn_columns<false>(weights, traces, signs, n_columns, step)
+                              : learn_columns<true>(weights, traces, signs, n_columns, step);
+}
+
+SDNN_INLINE void spread_signs_body(const std::uint64_t* active, const std::uint64_t* positive,
+                                   std::size_t n_words, std::int8_t* signs) noexcept {
   for (std::size_t w = 0; w < n_words; ++w) {
-    for (std::size_t half = 0; half < 2; ++half, masks += 32) {
-      const auto bits = static_cast<std::uint32_t>(words[w] >> (32 * half));
-      for (std::uint32_t bit = 0; bit < 32; ++bit) {
-        masks[bit] = -static_cast<std::int32_t>(bits >> bit & 1);
-      }
-    }
+    coding::detail::expand_word(active[w] & positive[w], active[w] & ~positive[w], signs + 64 * w);
   }
 }
 
 }  // namespace detail
 
-/// Writes a mask for every bit: all bits or none. Shapes: words (n_words,), masks (64 n_words,).
-SDNN_KERNEL(void, spread_bits,
-            (const std::uint64_t* words, std::size_t n_words, std::int32_t* masks),
-            (words, n_words, masks))
+/// Writes the signs of a code, -1, 0 or +1: a column is not 0 where its bit in `active` is set, and
+/// +1 where that in `positive` is set, too. Shapes: words (n_words,), signs (64 n_words,).
+SDNN_KERNEL(void, spread_signs,
+            (const std::uint64_t* active, const std::uint64_t* positive, std::size_t n_words,
+             std::int8_t* signs),
+            (active, positive, n_words, signs))
 
 /// Computes the product of each row with the code. Requires weights below 2^23 in magnitude.
-/// Shapes: rows and sums (n_rows,), each row and masks (n_columns,).
+/// Shapes: rows and sums (n_rows,), each row and signs (n_columns,).
 SDNN_KERNEL(void, row_sums,
-            (const std::int32_t* const* rows, std::size_t n_rows, CodeMasks code,
+            (const std::int32_t* const* rows, std::size_t n_rows, const std::int8_t* signs,
              std::size_t n_columns, std::int64_t* sums),
-            (rows, n_rows, code, n_columns, sums))
+            (rows, n_rows, signs, n_columns, sums))
 
 /// Returns the product of a row with the code.
-inline std::int64_t row_sum(const std::int32_t* row, CodeMasks code, std::size_t n_columns) {
+inline std::int64_t row_sum(const std::int32_t* row, const std::int8_t* signs,
+                            std::size_t n_columns) {
   std::int64_t sum = 0;
-  row_sums(&row, 1, code, n_columns, &sum);
+  row_sums(&row, 1, signs, n_columns, &sum);
   return sum;
 }
 
-/// Applies a step of learning to a row. Shapes: weights, traces and masks (n_columns,).
+/// Applies a step of learning to a row. Shapes: weights, traces and signs (n_columns,).
 SDNN_KERNEL(RowUse, learn_row,
-            (std::int32_t* weights, std::int32_t* traces, CodeMasks code, std::size_t n_columns,
-             RowStep step),
-            (weights, traces, code, n_columns, step))
+            (std::int32_t* weights, std::int32_t* traces, const std::int8_t* signs,
+             std::size_t n_columns, RowStep step),
+            (weights, traces, signs, n_columns, step))
 
 class LinearSDNN;
 
@@ -175,20 +164,12 @@ class LinearCode {
   /// Columns that are not 0.
   std::int32_t n_active() const noexcept { return n_active_; }
   /// -1, 0 or +1 for each column.
-  std::vector<std::int8_t> signs() const {
-    std::vector<std::int8_t> signs(active_.size());
-    for (std::size_t j = 0; j < signs.size(); ++j) {
-      signs[j] = static_cast<std::int8_t>(times_code(1, active_[j], negative_[j]));
-    }
-    return signs;
-  }
-
-  CodeMasks masks() const noexcept { return {active_.data(), negative_.data()}; }
+  const std::vector<std::int8_t>& signs() const noexcept { return signs_; }
 
  private:
   friend class LinearSDNN;
 
-  std::vector<std::int32_t> active_, negative_;
+  std::vector<std::int8_t> signs_;
   std::int32_t n_active_ = 0;
 };
 

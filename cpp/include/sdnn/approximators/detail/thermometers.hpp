@@ -34,26 +34,21 @@ class Thermometers {
     return static_cast<std::size_t>(n_codes) * static_cast<std::size_t>(n_units_);
   }
 
-  /// Writes the masks of the codes; see CodeMasks. A bin beyond the others stands for a missing
-  /// reading: its code is 0. Shapes: bins (l,), active and negative (n_columns,). Returns how many
-  /// columns are not 0.
-  std::size_t write(std::span<const coding::Bin> bins, std::int32_t* active,
-                    std::int32_t* negative) const noexcept {
+  /// Writes the codes. A bin beyond the others stands for a missing reading: its code is 0. Shapes:
+  /// bins (l,), signs (n_columns,). Returns how many columns are not 0.
+  std::size_t write(std::span<const coding::Bin> bins, std::int8_t* signs) const noexcept {
     std::size_t n_active = 0;
     for (std::size_t i = 0; i < n_bins_.size(); ++i) {
       const coding::Bin n_bins = n_bins_[i];
       if (n_bins == 0) continue;
-      const bool is_read = bins[i] < n_bins;
+      signs = std::fill_n(signs, n_units_, 0);
+      if (bins[i] >= n_bins) continue;
       const coding::Bin last = std::max(n_bins - 1, 1);
       const std::int64_t twice_above = std::int64_t{2} * bins[i] * n_units_ + last;
-      const auto n_above =
-          is_read ? static_cast<coding::Bin>(twice_above / (std::int64_t{2} * last)) : 0;
-      std::fill_n(active, n_units_, is_read ? -1 : 0);
-      std::fill_n(negative, n_units_, 0);
-      if (is_read) std::fill_n(negative + n_above, n_units_ - n_above, -1);
-      active += n_units_;
-      negative += n_units_;
-      if (is_read) n_active += static_cast<std::size_t>(n_units_);
+      const auto n_above = static_cast<coding::Bin>(twice_above / (std::int64_t{2} * last));
+      std::fill_n(signs - n_units_, n_above, 1);
+      std::fill(signs - n_units_ + n_above, signs, -1);
+      n_active += static_cast<std::size_t>(n_units_);
     }
     return n_active;
   }

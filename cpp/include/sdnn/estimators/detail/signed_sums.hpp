@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "sdnn/coding/detail/expanded_bits.hpp"
 #include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/coding/selective_desensitization.hpp"
 #include "sdnn/core/detail/kernel.hpp"
@@ -92,36 +93,6 @@ SDNN_INLINE void add_row_body(std::int32_t* to, const Product* row, std::int32_t
   }
 }
 
-SDNN_WIDE_VECTORS_BEGIN
-
-/// Sets entries[k] = bit k of `plus` minus bit k of `minus`, for 32 bits.
-SDNN_INLINE void expand_bits(std::uint32_t plus, std::uint32_t minus,
-                             std::int8_t* entries) noexcept {
-#if SDNN_LANES
-  using Bytes = core::IntegerRegister<std::int8_t>;
-  typedef std::uint8_t Bits __attribute__((vector_size(32)));
-  constexpr Bits kOwn = {1, 2, 4, 8, 16, 32, 64, 128, 1, 2, 4, 8, 16, 32, 64, 128,  //
-                         1, 2, 4, 8, 16, 32, 64, 128, 1, 2, 4, 8, 16, 32, 64, 128};
-  const auto all_ones_if_set = [&](std::uint32_t bits) SDNN_INLINE_LAMBDA {
-    typedef std::uint32_t Copies __attribute__((vector_size(32)));
-    const Bits copies = (Bits)(Copies{} + bits);
-    const Bits own = __builtin_shufflevector(copies, copies,                                  //
-                                             0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1,  //
-                                             18, 18, 18, 18, 18, 18, 18, 18,                  //
-                                             19, 19, 19, 19, 19, 19, 19, 19);
-    return Bytes{(Bytes::Vector)((own & kOwn) == kOwn)};
-  };
-  Bytes{all_ones_if_set(minus).v - all_ones_if_set(plus).v}.store(entries);
-#else
-  for (int k = 0; k < 32; ++k) {
-    entries[k] = static_cast<std::int8_t>(static_cast<int>(plus >> k & 1) -
-                                          static_cast<int>(minus >> k & 1));
-  }
-#endif
-}
-
-SDNN_WIDE_VECTORS_END
-
 SDNN_INLINE void expand_code_body(const coding::TernaryCode& code,
                                   std::span<const std::size_t> words, std::size_t chunk_words,
                                   std::int8_t* entries, std::size_t chunk_stride) noexcept {
@@ -129,10 +100,7 @@ SDNN_INLINE void expand_code_body(const coding::TernaryCode& code,
     for (std::size_t k = 0; k < chunk_words; ++k) {
       const std::uint64_t plus = code.positive[words[w + k]];
       const std::uint64_t minus = code.active[words[w + k]] & ~plus;
-      for (const std::size_t half : {0U, 1U}) {
-        expand_bits(static_cast<std::uint32_t>(plus >> 32 * half),
-                    static_cast<std::uint32_t>(minus >> 32 * half), entries + 64 * k + 32 * half);
-      }
+      coding::detail::expand_word(plus, minus, entries + 64 * k);
     }
   }
 }
