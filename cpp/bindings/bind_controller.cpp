@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <numeric>
 #include <optional>
 #include <span>
 #include <stdexcept>
@@ -166,29 +168,46 @@ std::size_t learn_each(Controller& controller, const ArrayArgument<double>& obse
   return n_learned;
 }
 
-/// Copies observations of several environments, of `shape` each, to rows of float64; None where
-/// they are no such array of numbers.
-std::optional<py::array_t<double>> observation_rows(const py::object& observations,
-                                                    const py::tuple& shape) {
-  if (!py::isinstance<py::array>(observations)) return std::nullopt;
-  const auto array = py::reinterpret_borrow<py::array>(observations);
-  if (array.ndim() != static_cast<py::ssize_t>(shape.size()) + 1) return std::nullopt;
-  py::ssize_t n_variables = 1;
-  for (std::size_t k = 0; k < shape.size(); ++k) {
-    if (array.shape(static_cast<py::ssize_t>(k) + 1) != shape[k].cast<py::ssize_t>()) {
-      return std::nullopt;
-    }
-    n_variables *= shape[k].cast<py::ssize_t>();
-  }
+/// Whether an object is an array of numbers with `n_before` dimensions before `shape`.
+bool is_array_of(py::handle object, py::ssize_t n_before, const std::vector<py::ssize_t>& shape) {
+  if (!Py_IS_TYPE(object.ptr(), py::detail::npy_api::get().PyArray_Type_)) return false;
+  const auto array = py::reinterpret_borrow<py::array>(object);
+  return array.ndim() == static_cast<py::ssize_t>(shape.size()) + n_before &&
+         std::equal(shape.begin(), shape.end(), array.shape() + n_before) &&
+         std::string_view("fiub").find(array.dtype().kind()) != std::string_view::npos;
+}
+
+/// Copies the numbers of an array to `to`, and returns their end.
+double* copy_numbers(py::handle object, double* to) {
+  const auto array = py::reinterpret_borrow<py::array>(object);
   const py::dtype type = array.dtype();
-  if (std::string_view("fiub").find(type.kind()) == std::string_view::npos) return std::nullopt;
-  py::array_t<double> rows({array.shape(0), n_variables});
   const bool is_float = type.num() == py::dtype::num_of<float>() && type.byteorder() == '=';
   if (is_float && (array.flags() & py::array::c_style) != 0) {
-    std::copy_n(static_cast<const float*>(array.data()), rows.size(), rows.mutable_data());
-  } else {
-    const ArrayArgument<double>::Base numbers(observations);
-    std::copy_n(numbers.data(), rows.size(), rows.mutable_data());
+    return std::copy_n(static_cast<const float*>(array.data()), array.size(), to);
+  }
+  const ArrayArgument<double>::Base numbers(array);
+  return std::copy_n(numbers.data(), numbers.size(), to);
+}
+
+/// Copies observations of several environments, of `shape` each, in an array or a list of arrays,
+/// to rows of float64; None where they are no such arrays of numbers.
+std::optional<py::array_t<double>> observation_rows(const py::object& observations,
+                                                    const std::vector<py::ssize_t>& shape) {
+  const auto n_variables =
+      std::accumulate(shape.begin(), shape.end(), py::ssize_t{1}, std::multiplies<>());
+  if (is_array_of(observations, 1, shape)) {
+    const auto array = py::reinterpret_borrow<py::array>(observations);
+    py::array_t<double> rows({array.shape(0), n_variables});
+    copy_numbers(array, rows.mutable_data());
+    return rows;
+  }
+  if (!py::isinstance<py::list>(observations)) return std::nullopt;
+  const auto list = py::reinterpret_borrow<py::list>(observations);
+  py::array_t<double> rows({static_cast<py::ssize_t>(list.size()), n_variables});
+  double* to = rows.mutable_data();
+  for (const py::handle observation : list) {
+    if (!is_array_of(observation, 0, shape)) return std::nullopt;
+    to = copy_numbers(observation, to);
   }
   return rows;
 }
@@ -411,6 +430,6 @@ void bind_controller(py::module_& module) {
   bindings::def_state(type);
   module.def(
       "observation_rows", &observation_rows, py::arg("observations"), py::arg("shape"),
-      "Observations of several environments, of a shape each, as rows of float64; None where "
-      "they are no such array of numbers");
+      "Observations of several environments, of a shape each, in an array or a list of arrays, as "
+      "rows of float64; None where they are no such arrays of numbers");
 }

@@ -2298,9 +2298,9 @@ def n_units_for(scheme: str, n_classes: typing.SupportsInt | typing.SupportsInde
     """
 def normal_quantile(p: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     ...
-def observation_rows(observations: typing.Any, shape: tuple) -> numpy.typing.NDArray[numpy.float64] | None:
+def observation_rows(observations: typing.Any, shape: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> numpy.typing.NDArray[numpy.float64] | None:
     """
-    Observations of several environments, of a shape each, as rows of float64; None where they are no such array of numbers
+    Observations of several environments, of a shape each, in an array or a list of arrays, as rows of float64; None where they are no such arrays of numbers
     """
 def power(base: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], exponent: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> typing.Any:
     ...

@@ -7,7 +7,6 @@ from typing import Any, Literal, TypeAlias
 
 import gymnasium as gym
 import numpy as np
-from numpy import ndarray
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
@@ -116,7 +115,7 @@ class Observations:
 
     def rows(self, name: str, observations: Any) -> NDArray[np.float64]:
         """Copy several observations, (n, n_variables); ValueError if one of them does not fit."""
-        if type(observations) is ndarray and self._shape is not None:
+        if self._shape is not None:
             rows = _core.observation_rows(observations, self._shape)
             if rows is not None:
                 return rows

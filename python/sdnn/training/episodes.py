@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy import ndarray
 
 from sdnn.environments.types import AnyEnv, Data, Element, Elements, Env, Info, Mask, Masks
 from sdnn.support.arguments import duration_of, flag, reward_of, shown
 from sdnn.training.files import (
+    MOST_RECENT,
     ActionLog,
     SavedEpisode,
     Statistics,
@@ -27,6 +26,7 @@ from sdnn.training.interfaces import (
     Options,
     Seeds,
     UnusableStepError,
+    copied,
     warn_of_endless_episode,
 )
 
@@ -40,9 +40,6 @@ _OLD_API = (
     "; an environment of Gym before 0.26 can be wrapped:"
     " shimmy.GymV21CompatibilityV0(env=env), from pip install shimmy"
 )
-
-_SCALARS = (np.generic, int, float)
-"""Immutable types of observations and actions, which need no copy."""
 
 
 class UnrepeatedEpisodeError(ValueError):
@@ -128,13 +125,6 @@ def checked_outcome(reward: Any, terminated: object, truncated: object) -> tuple
     return reward, terminated, truncated
 
 
-def copied(value: Element) -> Element:
-    """Copy an observation or action that an environment or agent may change later."""
-    if type(value) is ndarray:
-        return value.copy()
-    return value if isinstance(value, _SCALARS) else copy.deepcopy(value)
-
-
 class SingleEnvironment(EnvironmentAdapter):
     """A single environment."""
 
@@ -169,7 +159,7 @@ class SingleEnvironment(EnvironmentAdapter):
     def step(self, actions: Elements) -> Elements:
         """Step the environment with the action of environment 0, and return a batch of one."""
         observation, self.rewards[0], self.terminated[0], self.truncated[0] = self.take(actions[0])
-        return observation[None] if type(observation) is ndarray else [observation]
+        return [observation]
 
 
 def episode_seed(seed: int, kind: int, episode: int) -> int:
@@ -239,6 +229,7 @@ class Episodes:
         self.masks: Masks | None = None
         self._environments = list(range(n))
         self._begins_with_step: dict[int, int] = {}
+        self._n_unpacked = 0
 
     @property
     def learned_before(self) -> list[Statistics]:
@@ -282,7 +273,12 @@ class Episodes:
             episode: Any = self.present[i]
             episode.n_steps += 1
             if has_seeds:
-                episode.actions.append(actions[i])
+                episode.actions.recent.append(actions[i])
+        self._n_unpacked += 1
+        if self._n_unpacked == MOST_RECENT:
+            self._n_unpacked = 0
+            for present in filter(None, self.present):
+                present.actions.pack()
         try:
             observations = self.adapter.step(actions)
             if self.adapter.dts is not None:

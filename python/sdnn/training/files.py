@@ -238,7 +238,7 @@ def read_agent(path: Path, *kinds: str) -> tuple[Any, Description, Arrays]:
         raise ValueError(f"{path} is damaged: {error}") from error
 
 
-_N_RECENT = 1024
+MOST_RECENT = 1024
 """Number of actions that are kept in a list before they become an array."""
 
 
@@ -247,19 +247,19 @@ class ActionLog:
 
     def __init__(self, actions: Array | None = None) -> None:
         self._arrays = [] if actions is None or not len(actions) else [actions]
-        self._recent: list[Element] = []
+        self.recent: list[Element] = []
+        """Where actions are added, of the shape and type of the others; see `pack`."""
 
     def array(self) -> Array:
         """Return all actions, shape (n, ...)."""
-        arrays = self._arrays + ([np.array(self._recent)] if self._recent else [])
+        arrays = self._arrays + ([np.array(self.recent)] if self.recent else [])
         return np.concatenate(arrays) if arrays else np.empty(0)
 
-    def append(self, action: Element) -> None:
-        """Add an action, of the shape and type of the others."""
-        self._recent.append(action)
-        if len(self._recent) == _N_RECENT:
-            self._arrays.append(np.array(self._recent))
-            self._recent.clear()
+    def pack(self) -> None:
+        """Move recent actions to an array."""
+        if self.recent:
+            self._arrays.append(np.array(self.recent))
+            self.recent.clear()
 
 
 class SavedEpisode(msgspec.Struct, frozen=True, kw_only=True):

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from sdnn.environments.types import Array, Data, Element, Elements, Info, Mask, Masks
 from sdnn.support.arguments import require
 from sdnn.support.interrupts import Interrupts
-from sdnn.training.episodes import Episodes, checked_outcome, copied
+from sdnn.training.episodes import Episodes, checked_outcome
 from sdnn.training.evaluation import evaluate
 from sdnn.training.files import EpisodeBlock, share_statistics, statistics_of
 from sdnn.training.interfaces import (
@@ -29,6 +29,7 @@ from sdnn.training.interfaces import (
     ObservingLearner,
     Transition,
     UnusableStepError,
+    copied,
 )
 
 Row: TypeAlias = Mapping[str, Any]

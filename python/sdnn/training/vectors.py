@@ -35,7 +35,7 @@ class _SyncEnvironments(EnvironmentAdapter):
         self._env = env
         self._adapters = [SingleEnvironment(single) for single in env.envs]
         self._space = env.single_observation_space
-        self._shape, self._is_box = self._space.shape, type(self._space) is gym.spaces.Box
+        self._shape, self._dtype = self._space.shape, self._space.dtype
         self.n_environments = env.num_envs
         self.masks = [None] * env.num_envs if announces(env, "action_masks") else None
         self.dts = [1.0] * env.num_envs if announces(env, "durations") else None
@@ -71,16 +71,14 @@ class _SyncEnvironments(EnvironmentAdapter):
 
         Observations that do not fit are returned unchanged: the agent's error names them.
         """
-        space, n_arrays = self._space, 0
+        space, shape, dtype = self._space, self._shape, self._dtype
         for observation in observations:
-            if type(observation) is ndarray:
-                if observation.shape != self._shape:
-                    return observations
-                n_arrays += 1
-        if self._is_box and n_arrays == len(observations):
-            rows = np.array(observations)
-            if rows.dtype == space.dtype:
-                return rows
+            if type(observation) is not ndarray or observation.dtype is not dtype:
+                break
+            if observation.shape != shape:
+                return observations
+        else:
+            return observations
         if any(has_mask(space, observation) for observation in observations):
             return observations  # the vector's arrays would drop the mask of a masked array
         batch: Any = create_empty_array(space, len(observations))
