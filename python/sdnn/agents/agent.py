@@ -135,7 +135,7 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
 
     @property
     def n_learned(self) -> int:
-        """Number of steps learned in all, also before a save.
+        """Number of steps learned or imitated in all, also before a save; not those of excursions.
 
         On-policy agents, `SDNNActorCritic` and `FuzzyQLearning`, learn none of their warm-up.
         """

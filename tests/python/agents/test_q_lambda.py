@@ -148,6 +148,24 @@ def test_a_step_that_the_agent_did_not_take_is_learned_after_an_excursion():
         assert (agent.readout.weights() != before).any()
 
 
+def test_steps_of_excursions_do_not_count_as_learned(tmp_path):
+    agent = SDNNQLambda(
+        gym.spaces.Box(-1.0, 1.0, (2,)), gym.spaces.Discrete(2), seed=1,
+        learning=QLambdaConfig(epsilon=0.5), warm_up_steps=50,
+    )  # fmt: skip
+    rng, n_steps, n_left_out = np.random.default_rng(0), 2500, 0
+    for step in range(n_steps):
+        observation, next_observation = rng.uniform(-1, 1, (2, 2))
+        action = agent.act(observation)
+        before = None if step < 2000 else agent.readout.weights()
+        agent.learn(Transition(observation, action, rng.normal(), next_observation, False))
+        n_left_out += before is not None and np.array_equal(agent.readout.weights(), before)
+    assert n_left_out > 50
+    assert agent.n_learned == n_steps - n_left_out
+    agent.save(tmp_path / "agent.safetensors")
+    assert load_agent(tmp_path / "agent.safetensors").n_learned == agent.n_learned
+
+
 def test_a_few_discrete_states_have_exact_independent_values(tmp_path):
     space = gym.spaces.Discrete(5, start=3)
     agent = SDNNQLambda(space, gym.spaces.Discrete(2), seed=1)

@@ -86,9 +86,11 @@ def test_an_endless_episode_in_c_has_the_excursions_of_the_agent(target, tmp_pat
     initial_image = save_image(agent)
     actions, image = run_program(command, initial_image, lines, agent.n_dimensions)
     assert actions == run_agent(agent, lines, header.fraction_bits)
-    (n_learned,) = (value for name, value in agent.state().items() if name.endswith("n_learned"))
-    assert n_learned < len(lines) - 100, "steps of excursions are not learned"
+    assert agent.n_learned < len(lines) - 100, "steps of excursions are not learned"
     assert image == save_image(agent)
+    restored = discrete()
+    load_image(restored, image)
+    assert restored.n_learned == agent.n_learned
 
 
 def test_extreme_readings_and_rewards_have_defined_results(target, tmp_path):

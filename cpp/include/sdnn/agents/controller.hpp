@@ -245,11 +245,9 @@ class Controller : public WithRates<Controller> {
 
   /// The size of recent rewards, and the first reward that was too large to be learned.
   const RewardScale& reward_scale() const noexcept { return reward_scale_; }
-  /// The number of learned transitions. Those of a warm-up count, unless the agent is on-policy.
-  std::uint64_t n_learned() const noexcept {
-    if (!warm_up_) return reward_scale_.n_rewards();
-    return is_on_policy(config_.learning) ? 0 : warm_up_->size();
-  }
+  /// The number of learned transitions: those of a warm-up count, unless the agent is on-policy,
+  /// steps of excursions do not.
+  std::uint64_t n_learned() const;
 
   /// Learns a transition, unless its reward is far larger than the recent ones; see RewardScale.
   /// The action may be any action of the task; in a box, the agent's nearest action is learned.

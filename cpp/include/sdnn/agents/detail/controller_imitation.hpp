@@ -1,6 +1,7 @@
 /// How a controller checks and learns a transition, and learns from a teacher.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <type_traits>
 #include <variant>
@@ -42,6 +43,17 @@ inline bool Controller::has_acted(std::size_t environment) const {
         return true;
       },
       *agent_);
+}
+
+inline std::uint64_t Controller::n_learned() const {
+  if (warm_up_) return is_on_policy(config_.learning) ? 0 : warm_up_->size();
+  const auto of_agent = [this](const auto& agent) {
+    if constexpr (requires { agent.n_learned(); }) {
+      return static_cast<std::uint64_t>(agent.n_learned());
+    }
+    return reward_scale_.n_rewards();
+  };
+  return std::visit(of_agent, *agent_);
 }
 
 /// Learns the transition in state_, indices_ and next_state_.
