@@ -48,7 +48,7 @@ class TileCoding:
         self.n_tiles = n_tilings * (n_bins + 1) ** n_inputs
 
     def __call__(self, unit):
-        """The active tiles, one of each grid, shape (n_tilings,)."""
+        """The active tiles, one of each grid, shape (n_tilings,); of several rows together, too."""
         tile = np.floor(np.clip(unit, 0.0, 1.0) * self._n_bins + self._offset).astype(np.int64)
         return self._first + tile @ self._stride
 
@@ -64,8 +64,7 @@ class PairTiles:
 
     def __call__(self, unit):
         """The active tiles, one of each grid of each pair, shape (n_pairs * n_tilings,)."""
-        tiles = [self._code(unit[pair]) for pair in self._pairs]
-        return (np.array(tiles) + self._first[:, None]).ravel()
+        return (self._code(unit[self._pairs][:, None]) + self._first[:, None]).ravel()
 
 
 class HashedTiles(TileCoding):
