@@ -21,6 +21,11 @@ from sdnn.support.habits import advice
 Seeds: TypeAlias = Mapping[int, int | None]
 Options: TypeAlias = Data | None
 
+LONG = 2_000
+"""Steps in each environment after which a training without a terminated episode is a long one."""
+_LARGEST_DISCOUNT = 0.998
+"""Largest discount with which values are learned reliably where nothing terminates."""
+
 
 _SCALARS = (np.generic, int, float)
 """Immutable types of observations and actions, which need no copy."""
@@ -192,3 +197,16 @@ def warn_of_endless_episode(n_steps: int) -> None:
         RuntimeWarning,
         stacklevel=3,
     )
+
+
+def warn_of_horizon(agent: Any) -> None:
+    """Warn of a discount near 1 in a long training in which no episode has terminated."""
+    discount = getattr(getattr(agent, "learning", None), "discount", 0.0)
+    if discount > _LARGEST_DISCOUNT:
+        warnings.warn(
+            f"no episode has terminated in {LONG:,} steps: with a discount of {discount:g} values"
+            " become so large that differences between actions are hardly learned. Unless episodes"
+            f" will terminate, take learning.discount=0.99, or at most {_LARGEST_DISCOUNT}",
+            RuntimeWarning,
+            stacklevel=3,
+        )

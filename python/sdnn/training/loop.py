@@ -24,12 +24,14 @@ from sdnn.training.episodes import Episodes, checked_outcome
 from sdnn.training.evaluation import evaluate
 from sdnn.training.files import EpisodeBlock, share_statistics, statistics_of
 from sdnn.training.interfaces import (
+    LONG,
     CoreParts,
     Learner,
     ObservingLearner,
     Transition,
     UnusableStepError,
     copied,
+    warn_of_horizon,
 )
 
 Row: TypeAlias = Mapping[str, Any]
@@ -188,6 +190,8 @@ class TrainingLoop(abc.ABC):
     """Rows since the training was begun, or last loaded."""
     is_within_step = False
     """Whether an error left a step half done, which cannot be saved."""
+    _n_until_long = 0
+    """Steps at which the training is a long one; 0 after a terminated episode or a load."""
 
     _episodes: Episodes
     _learner: _LearnerForAll
@@ -235,6 +239,7 @@ class TrainingLoop(abc.ABC):
         if getattr(self.agent, "n_environments", 1) != n_environments and not self.is_finished:
             self.agent.n_environments = n_environments
         self._listeners = self._find_listeners()
+        self._n_until_long = 0 if self.n_steps else LONG * n_environments
         self._set_next_call()
 
     def _learn_until(self, due: float) -> int:
@@ -308,6 +313,8 @@ class TrainingLoop(abc.ABC):
             self.n_episodes += 1
             self._episodes.present[environment] = None
             self._warn_of_problems()
+            if row["terminated"] or not self.limit_bootstraps:
+                self._n_until_long = 0
             if self.evaluate_every_episodes is not None and self._lacks_evaluation:
                 self._learner.begin_episode(environment)  # learns the pending n-step returns first
         self._set_progress(is_over)
@@ -319,6 +326,8 @@ class TrainingLoop(abc.ABC):
         if rows:
             self._report(rows)
         if is_called:
+            if self.n_steps == self._n_until_long:
+                warn_of_horizon(self.agent)
             for interval, callback in self._listeners:
                 if self.n_steps % interval == 0:
                     callback.on_step(self)
@@ -341,6 +350,7 @@ class TrainingLoop(abc.ABC):
         intervals = [interval for interval, _ in self._listeners]
         intervals += [] if self.evaluate_every is None else [self.evaluate_every]
         goal = 2**62 if self.steps is None else self.steps
+        goal = min(goal, self._n_until_long) if n < self._n_until_long else goal
         self._next_call = min([goal, *(n - n % interval + interval for interval in intervals)])
 
     @property

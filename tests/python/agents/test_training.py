@@ -5,6 +5,7 @@ import functools
 import json
 import re
 import tracemalloc
+import warnings
 from decimal import Decimal
 
 import gymnasium as gym
@@ -675,6 +676,44 @@ def test_an_endless_episode_takes_less_than_32_bytes_per_step_and_resumes_exactl
     training.steps = 20_600
     assert training.run().n_steps == again.run().n_steps == 20_600
     assert states_equal(training.agent, again.agent)
+
+
+@pytest.mark.parametrize(
+    ("discount", "n_environments", "terminates", "limit_bootstraps", "warned_at"),
+    [
+        (0.999, 1, False, True, 2_000),
+        (1.0, 2, False, True, 4_000),
+        (0.998, 1, False, True, None),
+        (0.999, 1, True, True, None),
+        (0.999, 1, False, False, None),
+    ],
+)
+def test_a_discount_near_1_is_warned_of_once_where_nothing_terminates(
+    discount, n_environments, terminates, limit_bootstraps, warned_at, tmp_path
+):
+    class Unterminated(Corridor):
+        def step(self, action):
+            observation, reward, terminated, truncated, info = super().step(action)
+            return observation, reward, terminated and terminates, truncated or terminated, info
+
+    env = Unterminated()
+    if n_environments > 1:
+        env = gym.vector.SyncVectorEnv([Unterminated] * n_environments)
+    agent = corridor_agent(learning=QLearningConfig(discount=discount))
+    for n_steps in (1_999, 6_000):
+        training = Training(agent, env, steps=n_steps, limit_bootstraps=limit_bootstraps)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            training.run()
+        messages = [str(warning.message) for warning in caught]
+        is_warned = warned_at is not None and n_steps >= warned_at
+        assert [f"discount of {discount:g} values" in text for text in messages] == [
+            True
+        ] * is_warned
+    training.save(tmp_path / "t")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        Training.load(tmp_path / "t", env, steps=10_000).run()
 
 
 def test_evaluations_every_5_episodes_come_at_their_ends_and_resume_exactly(tmp_path):
