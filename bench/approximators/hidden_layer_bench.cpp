@@ -68,7 +68,7 @@ class Lists {
       code.bins_of(random_state(network, random), bins);
       code.encode(bins, words.data(), words.data() + code.n_words());
       lists.read(ternary);
-      columns_.push_back(lists.columns_with_bits(ternary));
+      columns_.push_back(lists.columns());
     }
   }
 
@@ -133,7 +133,7 @@ void pass(benchmark::State& state) {
     benchmark::DoNotOptimize(out.data());
     benchmark::ClobberMemory();
   }
-  state.counters["high"] = static_cast<double>(network.hidden_layer().n_high_columns());
+  state.counters["high"] = static_cast<double>(network.hidden_layer().n_high_bytes());
 }
 
 namespace detail {

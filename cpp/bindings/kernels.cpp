@@ -2,7 +2,6 @@
 #define SDNN_KERNELS_HERE
 
 #include "sdnn/approximators/detail/activation_cache.hpp"
-#include "sdnn/approximators/detail/column_set.hpp"
 #include "sdnn/approximators/detail/column_sums.hpp"
 #include "sdnn/approximators/detail/linear_rows.hpp"
 #include "sdnn/approximators/detail/window_counts.hpp"

@@ -44,7 +44,7 @@ TEST(HiddenLayer, PotentialsAndCorrectionsAreAsWorkedByHand) {
 // Random problems of many shapes, with weights on both sides of one byte, against plain sums.
 TEST(HiddenLayer, PotentialsEqualPlainSumsOnRandomProblems) {
   core::Random random(11, core::Stream::weights);
-  std::size_t n_high_columns = 0;
+  std::size_t n_high_bytes = 0;
   for (int problem = 0; problem < 60; ++problem) {
     const std::size_t n = 1 + random.below(problem % 10 == 0 ? 2500 : 200);
     const std::size_t columns = 1 + random.below(700);
@@ -61,9 +61,9 @@ TEST(HiddenLayer, PotentialsEqualPlainSumsOnRandomProblems) {
       }
     }
     if (largest == 127) {
-      EXPECT_EQ(p.n_high_columns(), 0U);
+      EXPECT_EQ(p.n_high_bytes(), 0U);
     }
-    n_high_columns += p.n_high_columns();
+    n_high_bytes += p.n_high_bytes();
     Input x;
     for (std::uint32_t j = 0; j < columns; ++j) {
       switch (random.below(4)) {
@@ -93,7 +93,7 @@ TEST(HiddenLayer, PotentialsEqualPlainSumsOnRandomProblems) {
     }
     EXPECT_EQ(potentials(p, few), expected);
   }
-  EXPECT_GT(n_high_columns, 1000U);
+  EXPECT_GT(n_high_bytes, 1000U);
 }
 
 TEST(HiddenLayer, AWeightBeyondAByteHasAHighByte) {
@@ -107,10 +107,10 @@ TEST(HiddenLayer, AWeightBeyondAByteHasAHighByte) {
     ASSERT_EQ(p.threshold(2), -i);
     ASSERT_EQ(potentials(p, x), (std::vector<std::int32_t>{0, 0, 3 * i}));
   }
-  EXPECT_EQ(p.n_high_columns(), 2U);
+  EXPECT_EQ(p.n_high_bytes(), 2U);
   for (int i = 500; i > 0; --i) p.update(unit, x, -1);
   EXPECT_EQ(p.weight(2, 0), 0);
-  EXPECT_EQ(p.n_high_columns(), 0U);
+  EXPECT_EQ(p.n_high_bytes(), 0U);
   for (int i = 0; i > -500; --i) p.update(unit, x, -1);
   EXPECT_EQ(p.weight(2, 0), -500);
   EXPECT_EQ(p.weight(0, 0), 0);
@@ -122,7 +122,7 @@ TEST(HiddenLayer, FewAndManyHighBytesGiveTheSameSums) {
   for (std::size_t j = 0; j < 1000; j += 3) p.set_weight(7, j, j % 2 == 0 ? 5000 : -5000);
   p.set_weight(100, 6, 200);
   p.set_weight(100, 7, -128);
-  EXPECT_EQ(p.n_high_columns(), 334U + 2U);  // in the block of unit 7, and in that of unit 100
+  EXPECT_EQ(p.n_high_bytes(), 334U + 2U);  // in the block of unit 7, and in that of unit 100
   Input x{.plus = {0, 3, 6, 6, 999}, .minus = {1, 7, 9}};
   const auto h = potentials(p, x);
   EXPECT_EQ(h[7], 5000 - 5000 + 2 * 5000 - 5000 + 5000);
@@ -136,7 +136,7 @@ TEST(HiddenLayer, CorrectionsThatCancelStayInAByte) {
   const Input x{.plus = {0, 3}, .minus = {4}};
   const std::vector<std::uint32_t> unit = {69};
   for (int i = 0; i < 2000; ++i) p.update(unit, x, i % 2 == 0 ? 1 : -1);
-  EXPECT_EQ(p.n_high_columns(), 0U);
+  EXPECT_EQ(p.n_high_bytes(), 0U);
   EXPECT_EQ(p.weight(69, 3), 0);
 }
 
@@ -173,8 +173,8 @@ TEST(HiddenLayer, CorrectionsEqualPlainOnesAtAnySizeOfWeights) {
     }
     ASSERT_EQ(potentials(p, x), expected) << "round " << round;
   }
-  EXPECT_GT(p.n_high_columns(), 0U);
-  EXPECT_LT(p.n_high_columns(), 3 * kColumns);
+  EXPECT_GT(p.n_high_bytes(), 0U);
+  EXPECT_LT(p.n_high_bytes(), kUnits * kColumns);
 }
 
 // The bound of a weight grows with every correction, and is looked up when it gets to the limit.
@@ -233,8 +233,8 @@ TEST(HiddenLayer, AddingToAColumnEqualsSettingItsWeights) {
   added.potentials(x, of_added);
   set.potentials(x, of_set);
   EXPECT_EQ(of_added, of_set);
-  EXPECT_EQ(added.n_high_columns(), set.n_high_columns());
-  EXPECT_GT(added.n_high_columns(), 0U);
+  EXPECT_EQ(added.n_high_bytes(), set.n_high_bytes());
+  EXPECT_GT(added.n_high_bytes(), 0U);
   std::fill(changes.begin(), changes.end(), 40000);
   EXPECT_THROW(added.add_to_column(0, changes, 1), std::invalid_argument);
 }

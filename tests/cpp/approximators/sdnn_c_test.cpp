@@ -99,7 +99,7 @@ TEST(SDNNC, LargeWeightsAllocateNothing) {
     for (double& value : state) value = random.uniform();
   }
   EXPECT_EQ(testing::allocation_count(), before);
-  EXPECT_GT(network.hidden_layer().n_high_columns(), 1000U);
+  EXPECT_GT(network.hidden_layer().n_high_bytes(), 1000U);
   EXPECT_EQ(values(network, state), values_by_masks(network, state));
 }
 

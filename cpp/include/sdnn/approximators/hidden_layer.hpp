@@ -13,8 +13,8 @@
 #include <utility>
 #include <vector>
 
-#include "sdnn/approximators/detail/column_set.hpp"
 #include "sdnn/approximators/detail/column_sums.hpp"
+#include "sdnn/approximators/detail/high_bytes.hpp"
 #include "sdnn/coding/detail/ternary_code.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/detail/check.hpp"
@@ -27,9 +27,9 @@ namespace sdnn::approximators {
 /// Every sum is exact, so its order does not matter. The units form blocks of 64; a block stores
 /// its weights by columns (a cache line has an input unit and 64 hidden units), because a pass
 /// reads only the columns that are not neutral. A weight is a byte, -127 to 127, plus 128 times a
-/// *high byte*. High bytes are in a second layer, of which a pass reads only the columns of a block
-/// with high bytes other than 0; few columns have them in training. A correction throws and changes
-/// nothing if a weight would exceed two bytes, or a potential 32 bits.
+/// *high byte*. High bytes are in a second layer. Since few are not 0 in training, blocks list
+/// these, and a pass reads the lists. A correction throws and changes nothing if a weight would
+/// exceed two bytes, or a potential 32 bits.
 ///
 /// Source: section 3.1 (layer 4, z) and Eqs. (2), (3).
 class HiddenLayer {
@@ -52,7 +52,8 @@ class HiddenLayer {
     const std::size_t n_bytes = core::checked_product(n_blocks_, block_bytes());
     bytes_ = core::AlignedBuffer<std::int8_t>(n_bytes);
     high_bytes_ = core::AlignedBuffer<std::int8_t>(n_bytes);
-    high_columns_.assign(n_blocks_, ColumnSet(n_columns));
+    // Above this number, adding whole columns of high bytes is faster.
+    high_lists_ = HighByteLists(n_blocks_, n_columns / 4);
     may_have_high_.assign(n_units, 0);
     thresholds_.assign(n_units, 0);
     largest_weight_.assign(n_units, 0);
@@ -64,8 +65,8 @@ class HiddenLayer {
   std::size_t n_columns() const noexcept { return n_columns_; }
   std::size_t n_double_columns() const noexcept { return n_double_; }
   std::size_t n_blocks() const noexcept { return n_blocks_; }
-  /// The number of columns with high bytes, summed over blocks.
-  std::size_t n_high_columns() const noexcept { return n_high_columns_; }
+  /// The number of high bytes other than 0.
+  std::size_t n_high_bytes() const noexcept { return high_lists_.size(); }
   /// The largest |weight| that does not cause std::overflow_error.
   std::int32_t weight_limit() const noexcept { return weight_limit_; }
 
@@ -80,7 +81,7 @@ class HiddenLayer {
     std::array<std::int32_t, kBlockUnits> weights;
     const std::size_t at = byte_index(block * kBlockUnits, column);
     for (std::size_t i = 0; i < kBlockUnits; ++i) weights[i] = std::int32_t{bytes_[at + i]};
-    if (high_columns_[block].size() == 0) return weights;
+    if (high_lists_.size_of(block) == 0) return weights;
     for (std::size_t i = 0; i < kBlockUnits; ++i) weights[i] += kHighByte * high_bytes_[at + i];
     return weights;
   }
@@ -91,10 +92,7 @@ class HiddenLayer {
     if (std::abs(value) > largest_weight_[unit]) note_largest(unit, std::abs(value));
     // High bytes are written only if they are needed: alternating pages of both layers would share
     // cache sets.
-    if (may_have_high_[unit]) {
-      high_bytes_[byte_index(unit, column)] = 0;
-      note_high(unit / kBlockUnits, column, false);
-    }
+    if (may_have_high_[unit]) set_high_byte(unit, column, 0);
     store(unit, column, value);
   }
   /// Adds sign * changes to the weights of a column. Shape: changes (n,). Throws
@@ -132,6 +130,7 @@ class HiddenLayer {
       std::int8_t volatile& byte = high_bytes_[at];
       byte = byte;
     }
+    high_lists_.touch_memory();
   }
 
   /// Writes the inner potentials of all units for the ternary input with these columns. Shape: out
@@ -144,8 +143,9 @@ class HiddenLayer {
 
   /// Adds w_i . x to out_i for the input with these columns, which may be repeated.
   void add(const coding::SignedColumns& input, std::span<std::int32_t> out) const {
-    add_signed(input.plus, input.plus_bits, +1, out);
-    add_signed(input.minus, input.minus_bits, -1, out);
+    add_signed(input.plus, +1, out);
+    add_signed(input.minus, -1, out);
+    if (n_high_bytes() > 0) add_listed_high_bytes(input, out);
   }
 
   /// Whether update would keep the |weights| of the unit that it moves within `limit`.
@@ -195,8 +195,6 @@ class HiddenLayer {
   static constexpr std::int32_t kHighByte = 128;
   static constexpr int kLargestGroup = 4;
 
-  using Listed = ListedColumns<ColumnPlaces::kMost>;
-
   std::size_t byte_index(std::size_t unit, std::size_t column) const noexcept {
     return unit / kBlockUnits * block_bytes() + column * kBlockUnits + unit % kBlockUnits;
   }
@@ -204,15 +202,13 @@ class HiddenLayer {
   /// The bytes of a block: its columns, and a column of zeros, for the padding of lists of columns.
   std::size_t block_bytes() const noexcept { return (n_columns_ + 1) * kBlockUnits; }
 
-  /// Adds sign * the weights of the columns to out_i. `bits` are the same columns, or empty.
-  void add_signed(std::span<const std::uint32_t> columns, std::span<const std::uint64_t> bits,
-                  int sign, std::span<std::int32_t> out) const {
-    if (columns.size() > ColumnPlaces::kMost) bits = {};
+  /// Adds sign * the weights of the columns to out_i, without high bytes that are listed.
+  void add_signed(std::span<const std::uint32_t> columns, int sign,
+                  std::span<std::int32_t> out) const {
     while (!columns.empty()) {
       const auto some = columns.first(std::min(ColumnPlaces::kMost, columns.size()));
       columns = columns.subspan(some.size());
       const ColumnPlaces places(some, n_columns_);
-      const Listed listed(n_high_columns_ > 0 && bits.empty() ? some : some.first(0));
       for (std::size_t b = 0; b < n_blocks_; ++b) {
         alignas(core::kCacheLine) std::array<std::int32_t, kBlockUnits> padded;
         const std::size_t first = b * kBlockUnits;
@@ -220,30 +216,38 @@ class HiddenLayer {
         if (!whole) padded.fill(0);
         std::int32_t* const sums = whole ? out.data() + first : padded.data();
         add_columns(bytes_.data() + b * block_bytes(), places, group_of_block_[b], sign, sums);
-        if (high_columns_[b].size() > 0) add_high_bytes(b, places, listed, bits, sign, sums);
+        if (high_lists_.is_overfull(b)) {
+          add_columns(high_bytes_.data() + b * block_bytes(), places, high_group_of_block_[b],
+                      sign * kHighByte, sums);
+        }
         for (std::size_t i = first; !whole && i < n_units_; ++i) out[i] += padded[i - first];
       }
     }
   }
 
-  /// Adds the high bytes, only of columns that have them unless these are many.
-  void add_high_bytes(std::size_t block, const ColumnPlaces& all, const Listed& listed,
-                      std::span<const std::uint64_t> bits, int sign, std::int32_t* sums) const {
-    const int group = high_group_of_block_[block];
-    const std::int8_t* const bytes = high_bytes_.data() + block * block_bytes();
-    if (high_columns_[block].size() >= n_columns_ / 4) {
-      return add_columns(bytes, all, group, sign * kHighByte, sums);
+  /// Adds the listed high bytes, each as often as the input has its column.
+  void add_listed_high_bytes(const coding::SignedColumns& input,
+                             std::span<std::int32_t> out) const {
+    std::array<std::int16_t, 8192> counts;
+    for (std::size_t first = 0; first < n_columns_; first += counts.size()) {
+      const std::size_t n = std::min(counts.size(), n_columns_ - first);
+      std::fill_n(counts.begin(), n, std::int16_t{0});
+      const auto count = [&](std::span<const std::uint32_t> columns, int change) {
+        for (const std::uint32_t column : columns) {
+          if (column - first >= n) continue;
+          std::int16_t& of_column = counts[column - first];
+          of_column = static_cast<std::int16_t>(of_column + change);
+        }
+      };
+      count(input.plus, +1);
+      count(input.minus, -1);
+      for (std::size_t b = 0; b < n_blocks_; ++b) {
+        for (const HighByte& high : high_lists_.of(b)) {
+          if (high.column - first >= n) continue;
+          out[b * kBlockUnits + high.unit] += kHighByte * high.value * counts[high.column - first];
+        }
+      }
     }
-    std::array<std::uint32_t, ColumnPlaces::kMost + 2> own;
-    const std::size_t n =
-        bits.empty()
-            ? listed.in(high_columns_[block], own.data())
-            : static_cast<std::size_t>(intersect_bits(bits.data(), high_columns_[block].words(),
-                                                      core::n_bit_words(n_columns_), own.data()) -
-                                       own.data());
-    if (n == 0) return;
-    add_columns(bytes, ColumnPlaces(std::span(own).first(n), n_columns_), group, sign * kHighByte,
-                sums);
   }
 
   /// The columns of an input whose weights a correction changes equally.
@@ -298,26 +302,19 @@ class HiddenLayer {
     if (std::abs(value) > kByteLimit) {
       const std::int32_t change = value / kHighByte;  // towards 0
       value -= change * kHighByte;
-      high_bytes_[at] = static_cast<std::int8_t>(high_bytes_[at] + change);
       may_have_high_[unit] = 1;
-      note_high(unit / kBlockUnits, column, high_bytes_[at] != 0);
+      set_high_byte(unit, column, high_bytes_[at] + change);
     }
     bytes_[at] = static_cast<std::int8_t>(value);
   }
 
-  /// Updates the set of a block's columns with high bytes after a change.
-  void note_high(std::size_t block, std::size_t column, bool is_there) noexcept {
-    ColumnSet& columns = high_columns_[block];
-    n_high_columns_ -= columns.size();
-    if (is_there) {
-      columns.add(column);
-    } else {
-      const std::int8_t* const line = high_bytes_.data() + byte_index(block * kBlockUnits, column);
-      if (std::all_of(line, line + kBlockUnits, [](std::int8_t b) { return b == 0; })) {
-        columns.remove(column);
-      }
-    }
-    n_high_columns_ += columns.size();
+  void set_high_byte(std::size_t unit, std::size_t column, std::int32_t value) noexcept {
+    std::int8_t& byte = high_bytes_[byte_index(unit, column)];
+    const HighByte high{static_cast<std::uint32_t>(column),
+                        static_cast<std::uint8_t>(unit % kBlockUnits),
+                        static_cast<std::int8_t>(value)};
+    high_lists_.change(unit / kBlockUnits, byte, high);
+    byte = high.value;
   }
 
   std::int32_t largest_weight(std::size_t unit) const noexcept {
@@ -398,8 +395,7 @@ class HiddenLayer {
   std::int32_t weight_limit_;
   core::AlignedBuffer<std::int8_t> bytes_;       ///< [block][column, then zeros][unit in block]
   core::AlignedBuffer<std::int8_t> high_bytes_;  ///< as `bytes_`, multiples of kHighByte
-  std::vector<ColumnSet> high_columns_;          ///< columns with high bytes, by block
-  std::size_t n_high_columns_ = 0;           ///< number of columns with high bytes in all blocks
+  HighByteLists high_lists_;
   std::vector<std::uint8_t> may_have_high_;  ///< whether a unit ever had a high byte
   std::vector<std::int32_t> thresholds_;
   std::vector<std::int32_t> largest_weight_;  ///< an upper bound of max_j |w_ij|

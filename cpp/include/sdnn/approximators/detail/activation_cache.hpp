@@ -217,10 +217,7 @@ class ActivationCache {
     }
     const std::span<std::int32_t> fresh(potentials_.data() + oldest * n_units_, n_units_);
     if (nearest == kEntries) {
-      coding::SignedColumns columns = list(code, bins);
-      if (hidden_layer.n_high_columns() > 0) {
-        columns = listed_[0].lists.columns_with_bits(to_.code());
-      }
+      const coding::SignedColumns columns = list(code, bins);
       hidden_layer.potentials(columns, fresh);
       ++counts_.full;
       counts_.columns += columns.size();
@@ -262,10 +259,7 @@ class ActivationCache {
     coding::TernaryCode encode(const coding::StateCode& code,
                                std::span<const coding::Bin> bins) noexcept {
       code.encode(bins, words_.data(), words_.data() + code.n_words());
-      return this->code();
-    }
-    coding::TernaryCode code() const noexcept {
-      return {words_.data(), words_.data() + words_.size() / 2};
+      return {words_.data(), words_.data() + code.n_words()};
     }
 
    private:

@@ -222,13 +222,16 @@ template <std::size_t Group>
       prefetch_ahead(block, begin);
       for (std::size_t k = 0; k < ColumnPlaces::kAtOnce; k += 2 * Group) {
         for (std::size_t half = 0; half < 2; ++half) {
-          const __m256i first = group_sum_avx2(block, begin + k, Group, half);
-          const __m256i second = group_sum_avx2(block, begin + k + Group, Group, half);
+          __m256i first = group_sum_avx2(block, begin + k, Group, half);
+          __m256i second = group_sum_avx2(block, begin + k + Group, Group, half);
+          asm("" : "+x"(first), "+x"(second));  // GCC would load each column twice
           wide[2 * half] = _mm256_add_epi16(
               wide[2 * half], _mm256_maddubs_epi16(ones, _mm256_unpacklo_epi8(first, second)));
           wide[2 * half + 1] = _mm256_add_epi16(
               wide[2 * half + 1], _mm256_maddubs_epi16(ones, _mm256_unpackhi_epi8(first, second)));
         }
+        // ... nor would it keep the sums in registers.
+        asm("" : "+x"(wide[0]), "+x"(wide[1]), "+x"(wide[2]), "+x"(wide[3]));
       }
     }
     for (std::size_t quarter = 0; quarter < 8; ++quarter) {  // eight units each, in unit order

@@ -315,9 +315,6 @@ SDNN_KERNEL(void, list_changes,
 struct SignedColumns {
   std::span<const std::uint32_t> plus;
   std::span<const std::uint32_t> minus;
-  /// The columns as words of bits, column j at bit j % 64 of word j / 64; empty unless requested.
-  std::span<const std::uint64_t> plus_bits = {};
-  std::span<const std::uint64_t> minus_bits = {};
 
   std::size_t size() const noexcept { return plus.size() + minus.size(); }
 };
@@ -334,9 +331,7 @@ class ColumnLists {
       : first_columns_(n_words),
         words_(n_words + 1),
         plus_(128 * n_words + 8),
-        minus_(128 * n_words + 8),
-        bits_of_plus_(n_words + 1),
-        bits_of_minus_(n_words + 1) {
+        minus_(128 * n_words + 8) {
     for (std::size_t w = 0; w < n_words; ++w) {
       first_columns_[w] = static_cast<std::uint32_t>(w / words_per_group * columns_per_group +
                                                      w % words_per_group * 64);
@@ -364,23 +359,6 @@ class ColumnLists {
     return {std::span(plus_).first(n_plus_), std::span(minus_).first(n_minus_)};
   }
 
-  /// The columns of the code that was read last, with their bits.
-  SignedColumns columns_with_bits(const TernaryCode& code) noexcept {
-    std::ranges::fill(bits_of_plus_, 0);
-    std::ranges::fill(bits_of_minus_, 0);
-    for (std::size_t w = 0; w < first_columns_.size(); ++w) {
-      const std::size_t at = first_columns_[w] / 64;
-      const auto shift = static_cast<int>(first_columns_[w] % 64);
-      const auto add = [at, shift](std::vector<std::uint64_t>& to, std::uint64_t bits) {
-        to[at] |= bits << shift;
-        to[at + 1] |= bits >> 1 >> (63 - shift);
-      };
-      add(bits_of_plus_, code.positive[w]);
-      add(bits_of_minus_, code.active[w] & ~code.positive[w]);
-    }
-    return {columns().plus, columns().minus, bits_of_plus_, bits_of_minus_};
-  }
-
  private:
   void note_ends(const std::uint32_t* plus, const std::uint32_t* minus) noexcept {
     n_plus_ = static_cast<std::size_t>(plus - plus_.data());
@@ -391,8 +369,6 @@ class ColumnLists {
   std::vector<std::uint32_t> words_;          // scratch
   std::vector<std::uint32_t> plus_;
   std::vector<std::uint32_t> minus_;
-  std::vector<std::uint64_t> bits_of_plus_;
-  std::vector<std::uint64_t> bits_of_minus_;
   std::size_t n_plus_ = 0;
   std::size_t n_minus_ = 0;
 };
