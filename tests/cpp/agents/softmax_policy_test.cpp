@@ -83,19 +83,17 @@ TEST(Softmax, ActionsAreDrawnByTheirProbability) {
 TEST(Thermometers, UnitsWithThresholdsAboveTheBinAreNegative) {
   const approximators::Thermometers thermometers(3, {5, 0});
   ASSERT_EQ(thermometers.n_columns(), 3U);
-  const std::vector<std::vector<std::int32_t>> negative{
-      {-1, -1, -1}, {0, -1, -1}, {0, 0, -1}, {0, 0, -1}, {0, 0, 0}};
+  const std::vector<std::vector<std::int8_t>> expected{
+      {-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {1, 1, -1}, {1, 1, 1}};
+  std::vector<std::int8_t> signs(3, 7);
   for (coding::Bin bin = 0; bin < 5; ++bin) {
-    std::vector<std::int32_t> active(3, 7), found(3, 7);
     const coding::Bin bins[] = {bin, 0};
-    EXPECT_EQ(thermometers.write(bins, active.data(), found.data()), 3U);
-    EXPECT_EQ(active, std::vector<std::int32_t>(3, -1));
-    EXPECT_EQ(found, negative[static_cast<std::size_t>(bin)]) << bin;
+    EXPECT_EQ(thermometers.write(bins, signs.data()), 3U);
+    EXPECT_EQ(signs, expected[static_cast<std::size_t>(bin)]) << bin;
   }
-  std::vector<std::int32_t> active(3, 7), found(3, 7);
   const coding::Bin missing[] = {5, 0};
-  EXPECT_EQ(thermometers.write(missing, active.data(), found.data()), 0U);
-  EXPECT_EQ(active, std::vector<std::int32_t>(3, 0));
+  EXPECT_EQ(thermometers.write(missing, signs.data()), 0U);
+  EXPECT_EQ(signs, std::vector<std::int8_t>(3, 0));
 }
 
 TEST(SoftmaxPolicy, TheMeanOfAnActionAndItsNeighboursIsWeightedByProbabilities) {
