@@ -136,20 +136,35 @@ static inline void sdnn_predict(sdnn_episode* episode) {
   }
 }
 
+/* Moves predicted estimates by the errors of the predictions. */
+static inline void sdnn_correct_estimates(sdnn_real* estimates, const sdnn_real* errors) {
+  const sdnn_real farthest = UINT64_C(0x4018000000000000); /* 6 */
+  const sdnn_real* gain = sdnn_gains;
+  uint32_t k, j;
+  for (k = 0; k < SDNN_N_NUMBERS; ++k) {
+    sdnn_real change = 0;
+    for (j = 0; j < SDNN_N_NUMBERS; ++j, ++gain) {
+      const sdnn_real error =
+          j == k ? errors[j] : sdnn_between(errors[j], farthest | SDNN_MINUS, farthest);
+      change = sdnn_plus(change, sdnn_times(*gain, error));
+    }
+    estimates[k] = sdnn_plus(estimates[k], change);
+  }
+}
+
 static inline void sdnn_remember(sdnn_episode* episode, const sdnn_real* inputs, sdnn_real* state) {
+  sdnn_real *const estimates = episode->memory, errors[SDNN_N_NUMBERS];
   uint32_t k;
   if (episode->has_begun) sdnn_predict(episode);
   for (k = 0; k < SDNN_N_NUMBERS; ++k) {
     const sdnn_real x = sdnn_coordinate(inputs[sdnn_numbers[k]], k);
-    sdnn_real estimate = episode->memory[k];
-    if (episode->has_begun) {
-      const sdnn_real error = sdnn_minus(x, estimate);
-      estimate = sdnn_plus(
-          estimate, sdnn_times(SDNN_GAIN, sdnn_is_circular[k] ? sdnn_shorter(error) : error));
-    } else {
-      estimate = x;
-    }
-    episode->memory[k] = estimate;
+    if (!episode->has_begun) estimates[k] = x;
+    errors[k] = sdnn_minus(x, estimates[k]);
+    if (sdnn_is_circular[k]) errors[k] = sdnn_shorter(errors[k]);
+  }
+  if (episode->has_begun) sdnn_correct_estimates(estimates, errors);
+  for (k = 0; k < SDNN_N_NUMBERS; ++k) {
+    sdnn_real estimate = estimates[k];
     if (sdnn_is_circular[k]) {
       estimate = sdnn_part_of_turns(sdnn_over(estimate, SDNN_TWO_PI));
     } else {

@@ -84,7 +84,7 @@ class StateHistory:
         """The bytes of arrays that a step has on the stack."""
         if not self.is_needed:
             return 0
-        n_changes = len(self.numbers) if self.kind == "observer" else 0
+        n_changes = 2 * len(self.numbers) if self.kind == "observer" else 0
         return 8 * (2 * len(self.inputs) + len(self.added) + n_changes)
 
     @property
@@ -117,8 +117,6 @@ class StateHistory:
             "N_OBSERVED_INPUTS": len(self.inputs),
             "N_NUMBERS": len(self.numbers),
         }
-        if self.kind == "observer":
-            sizes["GAIN"] = real_number(self.fitted["observer.gain"])
         if self.is_box:
             sizes["N_REAL_ACTIONS"] = len(self.agent.actions_of(0))
             if acts_between:
@@ -156,6 +154,7 @@ class StateHistory:
         tables.add("uint64_t", "estimate_low", bits_of(fitted["low"]))
         tables.add("uint64_t", "estimate_width", bits_of(fitted["high"] - fitted["low"]))
         tables.add("uint64_t", "observer_weights", bits_of(fitted["weights"]))
+        tables.add("uint64_t", "gains", bits_of(fitted["gains"]))
         tables.add("uint8_t", "n_levels", fitted["n_levels"])
         tables.add("uint64_t", "levels", bits_of(fitted["levels"]))
         if not self.is_box:

@@ -14,6 +14,7 @@
 #include "allocation_count.hpp"
 #include "sdnn/agents/controller.hpp"
 #include "sdnn/agents/detail/least_squares.hpp"
+#include "sdnn/agents/detail/steady_gains.hpp"
 #include "sdnn/approximators/fuzzy_rules.hpp"
 #include "sdnn/coding/pattern_table.hpp"
 #include "sdnn/core/random.hpp"
@@ -123,6 +124,15 @@ TEST(History, AveragesMoveByAHalfAndAFifthOfTheDistance) {
     const double distance = std::abs(state[k] - expected[k]);
     EXPECT_LT(std::min(distance, 1.0 - distance), 1e-12) << k;
   }
+}
+
+TEST(History, SteadyGainsSolveTheRiccatiEquation) {
+  const double drift = 0.3, expected = (drift + std::sqrt(drift * drift + 4.0 * drift)) / 2.0;
+  EXPECT_NEAR(detail::steady_gains({1.0}, {2.0}, drift)[0], expected / (expected + 1.0), 1e-12);
+  // SciPy's solve_discrete_are gives the second ones.
+  const Numbers gains = detail::steady_gains({1.0, 0.2, 0.0, 0.9}, {1.0, 2.0}, 0.1);
+  const Numbers solved{0.31048834, 0.03958821, 0.07917642, 0.20620367};
+  for (std::size_t k = 0; k < 4; ++k) EXPECT_NEAR(gains[k], solved[k], 1e-8) << k;
 }
 
 TEST(History, AnObserverReducesTheErrorOfNoisySensors) {

@@ -44,6 +44,7 @@ class HistoryFilter {
     } else if (history == History::observer) {
       kind_ = History::none;
     }
+    if (kind_ == History::observer) observer_.refine(numbers);
     if (kind_ != History::observer) observer_ = {};
     if (kind_ == History::differences) find_largest_differences(experience);
   }
@@ -95,7 +96,7 @@ class HistoryFilter {
   std::vector<int> n_symbols() const {
     return extended<int>(n_symbols_, [](std::size_t) { return 0; });
   }
-  /// The gain of the observer, or 1.
+  /// How far an observer's first estimate moves by its own error, or 1.
   double gain() const noexcept { return observer_.gain(); }
 
   /// The part of an episode that is remembered; empty before its first observation.

@@ -22,13 +22,14 @@ namespace sdnn::agents::detail {
 /// by least squares from the inputs (of angles, cosine and sine) and the action. Each estimate then
 /// moves from its prediction towards the observation by a constant share, the gain: the one of
 /// eight candidates with the smallest prediction errors in the experience, so it is 1 for exact
-/// sensors.
+/// sensors. `refine` replaces it by gains of a Kalman filter, where each error moves all estimates.
 ///
 /// Estimates are in coordinates of the model: angles in radians, other inputs in standard
 /// deviations from their mean.
 ///
 /// Source: Luenberger, D. (1964), for observers of constant gain; the model is fitted to the
 /// estimates of the model before, as in Ljung, L., Soderstrom, T. (1983), pseudo-linear regression.
+/// Refined models are fitted by instrumental variables, as in Soderstrom, T., Stoica, P. (1983).
 class Observer {
  public:
   static constexpr std::size_t kMostInputs = 16;
@@ -46,7 +47,7 @@ class Observer {
       Observer next = *this;
       next.fit_weights(series, estimates);
       for (const double gain : kGains) {
-        next.gain_ = gain;
+        next.set_gain(gain);
         const double error = next.log_error(series);
         if (round == 0 && gain == 1.0) log_error_without_ = error;
         if ((round > 0 || gain < 1.0) && error >= least) continue;
@@ -61,11 +62,18 @@ class Observer {
   }
 
   std::size_t n_inputs() const noexcept { return circular_.size(); }
-  double gain() const noexcept { return gain_; }
+  /// How far the estimate of the first input moves by its own error.
+  double gain() const noexcept { return gains_.empty() ? 1.0 : gains_.front(); }
   /// The decrease of the mean logarithm of squared prediction errors if estimates replace inputs.
   double improvement() const noexcept {
     return (log_error_without_ - log_error_) / static_cast<double>(n_inputs());
   }
+
+  /// Fits a gain for each pair of inputs, and the model anew: noise in its features, which
+  /// predictions from earlier observations do not share, would make it underestimate their effect.
+  /// Fitted to a random policy, models are wrong elsewhere, so gains have a least size. Requires
+  /// the experience of the constructor.
+  void refine(const RandomExperience& experience);
 
   /// The estimates of an episode's first state. Shapes: (n_inputs,).
   void begin(std::span<const double> state, std::span<double> estimates) const noexcept {
@@ -76,9 +84,11 @@ class Observer {
   void follow(std::span<const double> action, std::span<const double> state,
               std::span<double> estimates, std::vector<double>& features) const {
     predict(action, estimates, features);
+    features.resize(n_inputs());
     for (std::size_t i = 0; i < n_inputs(); ++i) {
-      estimates[i] += gain_ * difference(coordinate(state[i], i), estimates[i], i);
+      features[i] = difference(coordinate(state[i], i), estimates[i], i);
     }
+    correct(estimates, features);
   }
   /// The state, in [0, 1], that estimates stand for. Shapes: (n_inputs,).
   void state_of(std::span<const double> estimates, std::span<double> state) const noexcept {
@@ -99,39 +109,7 @@ class Observer {
   /// explained then: a hidden velocity explains nearly all, while the last changes also stand in
   /// for products of three inputs, which the model lacks. Returns 0 where there would be too many
   /// products to fit.
-  double share_of_last_changes(const RandomExperience& experience) const {
-    const Series series = coordinates_of(experience);
-    std::vector<double> with, without, linear, changes, features;
-    if (n_features() > kMostFeaturesWithProducts) return 0.0;
-    for (std::size_t t = 1; t < series.size(); ++t) {
-      if (series.begins[t]) continue;
-      const auto state = series.row(series.observed, t);
-      find_features(series.actions_at(t), state, features);
-      linear.insert(linear.end(), features.begin(), features.end());
-      for (std::size_t i = 1, n = features.size(); i < n; ++i) {
-        for (std::size_t j = i; j < n; ++j) features.push_back(features[i] * features[j]);
-      }
-      without.insert(without.end(), features.begin(), features.end());
-      with.insert(with.end(), features.begin(), features.end());
-      const auto last = series.row(series.observed, t - 1), next = series.row(series.next, t);
-      for (std::size_t i = 0; i < n_inputs(); ++i) {
-        with.push_back(difference(state[i], last[i], i));
-        changes.push_back(difference(next[i], state[i], i));
-      }
-    }
-    if (changes.size() < kFewestTransitions * n_inputs()) return 0.0;
-    std::vector<double> shares(n_inputs(), 1.0);
-    for (const bool is_first : {true, false}) {
-      const auto before = explained(without, changes, is_first);
-      const auto by_linear = explained(linear, changes, is_first);
-      const auto after = explained(with, changes, is_first);
-      for (std::size_t i = 0; i < n_inputs(); ++i) {
-        const double share = after[i] - std::max({before[i], by_linear[i], 0.0});
-        shares[i] = std::min(shares[i], after[i] < kLeastExplained ? 0.0 : share);
-      }
-    }
-    return std::ranges::max(shares);
-  }
+  double share_of_last_changes(const RandomExperience& experience) const;
 
   /// Lists the members that are saved and restored; see core/state.hpp. Inputs that are angles are
   /// those of the task.
@@ -146,7 +124,7 @@ class Observer {
     }
     archive.numbers("levels", self.levels_);
     archive.numbers("weights", self.weights_);
-    archive.number("gain", self.gain_);
+    archive.numbers("gains", self.gains_);
     archive.numbers("low", self.low_);
     archive.numbers("high", self.high_);
     if constexpr (Archive::kReads) self.check(archive);
@@ -173,7 +151,9 @@ class Observer {
   };
 
   static constexpr double kGains[] = {1.0, 0.7, 0.5, 0.35, 0.25, 0.175, 0.125, 0.09};
-  static constexpr int kRounds = 3;
+  static constexpr double kDrifts[] = {3.0, 1.0, 0.3, 0.1, 0.03};
+  static constexpr double kLargestGain = 100.0;
+  static constexpr int kRounds = 3, kRefinements = 4;
   static constexpr std::size_t kMostTransitions = 20'000;
   static constexpr std::size_t kMostLevels = 8;
   static constexpr std::size_t kMostFeaturesWithProducts = 17;
@@ -305,6 +285,29 @@ class Observer {
     }
   }
 
+  void set_gain(double gain) {
+    gains_.assign(n_inputs() * n_inputs(), 0.0);
+    for (std::size_t i = 0; i < n_inputs(); ++i) gains_[i * n_inputs() + i] = gain;
+  }
+  /// Moves predicted estimates by the errors of the predictions. Shapes: (n_inputs,).
+  void correct(std::span<double> estimates, std::span<const double> errors) const noexcept {
+    for (std::size_t i = 0; i < n_inputs(); ++i) {
+      double change = 0.0;
+      for (std::size_t j = 0; j < n_inputs(); ++j) {
+        const double error = i == j ? errors[j] : within(errors[j], -kFarthest, kFarthest);
+        change += gains_[i * n_inputs() + j] * error;
+      }
+      estimates[i] += change;
+    }
+  }
+
+  /// The mean linear model of the next state, shape (n_inputs, n_inputs).
+  std::vector<double> transition(const Series& series) const;
+
+  /// Fits weights by two-stage least squares: features of observations, which have noise, are
+  /// replaced by what features of predictions explain of them.
+  std::vector<double> instrumental_weights(const Series& series) const;
+
   void fit_weights(const Series& series, const std::vector<double>& estimates) {
     std::vector<double> features, changes, row;
     for (std::size_t t = 0; t < series.size(); ++t) {
@@ -321,7 +324,7 @@ class Observer {
   /// Runs the observer over a series. It calls `with(estimates)` before every transition, then
   /// `error(i, difference)` with the error of the prediction of each input i.
   void run(const Series& series, const auto& with, const auto& error) const {
-    std::vector<double> estimates(n_inputs()), features;
+    std::vector<double> estimates(n_inputs()), errors(n_inputs()), features;
     for (std::size_t t = 0; t < series.size(); ++t) {
       core::interruption_point();
       if (series.begins[t]) std::ranges::copy(series.row(series.observed, t), estimates.begin());
@@ -329,10 +332,10 @@ class Observer {
       predict(series.actions_at(t), estimates, features);
       const auto next = series.row(series.next, t);
       for (std::size_t i = 0; i < n_inputs(); ++i) {
-        const double surprise = difference(next[i], estimates[i], i);
-        error(i, surprise);
-        estimates[i] += gain_ * surprise;
+        errors[i] = difference(next[i], estimates[i], i);
+        error(i, errors[i]);
       }
+      correct(estimates, errors);
     }
   }
   std::vector<double> estimates_of(const Series& series) const {
@@ -343,15 +346,18 @@ class Observer {
         [](std::size_t, double) {});
     return rows;
   }
-  double log_error(const Series& series) const {
+  /// The mean squared errors of predictions of each input.
+  std::vector<double> mean_squares(const Series& series) const {
     std::vector<double> squares(n_inputs());
     run(
         series, [](const auto&) {},
         [&](std::size_t i, double surprise) { squares[i] += surprise * surprise; });
+    for (double& square : squares) square /= static_cast<double>(series.size());
+    return squares;
+  }
+  double log_error(const Series& series) const {
     double sum = 0.0;
-    for (const double square : squares) {
-      sum += core::log(square / static_cast<double>(series.size()) + kLeastError);
-    }
+    for (const double square : mean_squares(series)) sum += core::log(square + kLeastError);
     return sum;
   }
 
@@ -359,30 +365,7 @@ class Observer {
   /// explains in one half of the transitions, if it is fitted to the other: to the first half, or
   /// to the second.
   std::vector<double> explained(const std::vector<double>& features,
-                                const std::vector<double>& changes, bool is_first) const {
-    const std::size_t n = changes.size() / n_inputs(), width = features.size() / n, half = n / 2;
-    const std::size_t begin = is_first ? 0 : n - half, first = is_first ? n - half : 0;
-    const auto rows = [begin, half](const std::vector<double>& values, std::size_t n_columns) {
-      const auto start = values.begin() + offset(begin * n_columns);
-      return std::vector<double>(start, start + offset(half * n_columns));
-    };
-    const auto weights = least_squares(rows(features, width), rows(changes, n_inputs()), half);
-    std::vector<double> errors(n_inputs()), squares(n_inputs()), shares;
-    for (std::size_t t = first; t < first + half; ++t) {
-      for (std::size_t i = 0; i < n_inputs(); ++i) {
-        double error = changes[t * n_inputs() + i];
-        squares[i] += error * error;
-        for (std::size_t k = 0; k < width; ++k) {
-          error -= weights[k * n_inputs() + i] * features[t * width + k];
-        }
-        errors[i] += error * error;
-      }
-    }
-    for (std::size_t i = 0; i < n_inputs(); ++i) {
-      shares.push_back(squares[i] > 0.0 ? 1.0 - errors[i] / squares[i] : 0.0);
-    }
-    return shares;
-  }
+                                const std::vector<double>& changes, bool is_first) const;
   static std::ptrdiff_t offset(std::size_t n) noexcept { return static_cast<std::ptrdiff_t>(n); }
 
   /// Checks what was read from a file.
@@ -408,7 +391,9 @@ class Observer {
     archive.expect(high_.size() == n_inputs() && core::are_finite(high_) &&
                        std::ranges::equal(low_, high_, std::less<>()),
                    "high", "for each input a finite number above low");
-    archive.expect(gain_ > 0.0 && gain_ <= 1.0, "gain", "in (0, 1]");
+    const auto is_gain = [](double x) { return std::abs(x) <= kLargestGain; };
+    archive.expect(gains_.size() == n_inputs() * n_inputs() && std::ranges::all_of(gains_, is_gain),
+                   "gains", "in [-100, 100] for each pair of inputs");
   }
 
   std::vector<bool> circular_;
@@ -416,9 +401,11 @@ class Observer {
   std::vector<std::int32_t> n_levels_ = {};  ///< of each dimension; 1: an action is a number
   std::vector<double> levels_ = {};   ///< actions that are told apart, or from which numbers count
   std::vector<double> weights_ = {};  ///< (n_features, n_inputs)
-  double gain_ = 1.0;
+  std::vector<double> gains_ = {};    ///< (n_inputs, n_inputs)
   std::vector<double> low_ = {}, high_ = {};  ///< of estimates
   double log_error_ = 0.0, log_error_without_ = 0.0;
 };
 
 }  // namespace sdnn::agents::detail
+
+#include "sdnn/agents/detail/observer_fit.hpp"
