@@ -21,6 +21,11 @@ from sdnn.reports.pages import Table
 
 EVIDENCE = Path(__file__).parents[1] / "docs" / "evidence"
 PAGE = EVIDENCE / "performance.md"
+PEERS = {
+    "q-lambda": "SDNNQLambda", "actor-critic": "SDNNActorCritic", "sdnn-c": "SDNN-C",
+    "rbf": "RBFN", "tiles": "tile coding", "tiles-pairs": "tiles of pairs",
+    "swift-sarsa": "Swift-Sarsa", "stream-ac": "stream AC", "stream-q": "stream Q",
+}  # fmt: skip
 DENSE_TITLES = {"numpy": "NumPy, 1 thread", "core": "sdnn's own kernel"}
 
 
@@ -109,12 +114,34 @@ def profile_table(profile: dict[str, dict[str, float]]) -> Table:
     return Table(title, ("function", *profile), rows)
 
 
+def peers_tables(peers: Mapping[str, Any]) -> list[Table]:
+    """Return steps of agents and environments, and estimators, measured in one run."""
+    tasks = peers["steps"]
+    rows = [
+        (PEERS.get(name, f"{name} at once"), *(f"{of[name]:.1f}" for of in tasks.values()))
+        for name in next(iter(tasks.values()))
+    ]
+    about = f"{peers['machine']}, load {peers['load']}, {peers['date']}"
+    title = f"A step of environments, and of agents without the environment's (us; {about})"
+    models = [
+        (name, f"{of['fit_s']:.3g}", f"{of['one_us']:.0f}", f"{of['many_us']:.2g}",
+         f"{of['r2']:.3f}")
+        for name, of in peers["estimators"].items()
+    ]  # fmt: skip
+    header = ("model", "fit, s", "one row, us", "a row of many, us", "R2")
+    return [
+        Table(title, ("by", *tasks), rows),
+        Table("Estimators on 1,000 rows of Friedman's problem (one thread)", header, models),
+    ]
+
+
 def page_tables() -> dict[str, str]:
     """Return each table of stored runs by its name in the page."""
     shown = (passes_table(stored("passes")), profile_table(stored("profile")))
     return {
         "performance": to_markdown(stored("performance")),
         "passes and profile": "\n".join(map(_titled, shown)),
+        "peers": "\n".join(map(_titled, peers_tables(stored("peers")))),
     }
 
 

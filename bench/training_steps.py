@@ -63,15 +63,17 @@ def training(learner: Any, env: Any) -> Iterator[int]:
         yield endless.n_steps
 
 
-def slices(steps: Iterator[int]) -> Callable[[], float]:
+def slices(
+    steps: Iterator[int], clock: Callable[[], float] = time.thread_time
+) -> Callable[[], float]:
     """Return a function that takes some steps and returns the microseconds of one."""
     done = next(steps)
 
     def take() -> float:
         nonlocal done
-        before, began = done, time.thread_time()
+        before, began = done, clock()
         done = next(steps)
-        return (time.thread_time() - began) * 1e6 / (done - before)
+        return (clock() - began) * 1e6 / (done - before)
 
     return take
 
