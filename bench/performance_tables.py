@@ -122,7 +122,7 @@ def peers_tables(peers: Mapping[str, Any]) -> list[Table]:
         for name in next(iter(tasks.values()))
     ]
     about = f"{peers['machine']}, load {peers['load']}, {peers['date']}"
-    title = f"A step of environments, and of agents without the environment's (us; {about})"
+    title = f"A step (us; agents without the environment; {about})"
     models = [
         (name, f"{of['fit_s']:.3g}", f"{of['one_us']:.0f}", f"{of['many_us']:.2g}",
          f"{of['r2']:.3f}")
@@ -131,7 +131,7 @@ def peers_tables(peers: Mapping[str, Any]) -> list[Table]:
     header = ("model", "fit, s", "one row, us", "a row of many, us", "R2")
     return [
         Table(title, ("by", *tasks), rows),
-        Table("Estimators on 1,000 rows of Friedman's problem (one thread)", header, models),
+        Table("Estimators, 1,000 rows of Friedman's problem", header, models),
     ]
 
 
