@@ -112,7 +112,7 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
 
     @property
     def observation_range(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Lowest and highest values of the observed variables, shapes (n_variables,), as used.
+        """Lowest and highest values that states can code, each of shape (n_variables,).
 
         RuntimeError if the warm-up has not found them yet.
         """

@@ -307,7 +307,7 @@ class WatchedAgent:
         self._agent.begin_greedy_episode()
 
     def act(self, observation: Element, explore: bool = False, mask: Mask = None) -> Element:
-        """Return the action of the agent, or a random one, and note it."""
+        """Return the agent's action, or a random one in its place; record state and action."""
         state = self._agent.flat_observation(observation)
         self.states.append(state)
         allowed = self._agent._actions.mask("mask", mask)

@@ -47,7 +47,7 @@ json_option = click.option("--json", "as_json", is_flag=True, help="Print the ou
 
 def option_of(key: str) -> str:
     """Return how the command line sets a key of a specification: ENV_ID, or an option."""
-    key = key.partition("[")[0]
+    key = key.partition("[")[0]  # an option sets a whole list, not one of its items
     if key == "agent.name":
         return "--agent"
     if key in (*KEYS, "steps", "episodes"):

@@ -249,6 +249,7 @@ def _estimator_in(source: Path) -> Fitted | None:
         return None
     from sdnn import estimators  # scikit-learn is slow to import
 
+    # Users export files of their own: 4 GiB admit larger estimators than the default of `load`.
     model: Fitted = getattr(estimators, name).load(source, memory_limit=2**32)
     return model
 

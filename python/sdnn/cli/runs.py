@@ -183,5 +183,6 @@ def record(folder: Path, out: Path, seed: int | None, steps: int | None) -> None
 
 
 def _check_ending(option: str, path: Path, endings: Sequence[str]) -> None:
+    """Raise a usage error that names the option if a file's ending is none of ``endings``."""
     if path.suffix not in endings:
         raise click.UsageError(f"{option} must end in one of {', '.join(endings)}, got {path}")

@@ -313,7 +313,10 @@ def require_same_kind(agent: object, env: object, argument: str = "env") -> None
 
 
 def _other_bounds(space: Any, other_space: Any, part: str = "") -> Iterator[str]:
-    """Yield a text for each variable whose bounds differ, with both bounds."""
+    """Yield a text with both bounds for each variable whose bounds differ.
+
+    ``part`` is the place of the spaces in a Dict or Tuple, such as "['arm'][0]".
+    """
     if isinstance(space, gym.spaces.Dict | gym.spaces.Tuple):
         keys: Any = space.keys() if isinstance(space, gym.spaces.Dict) else range(len(space))
         for key in keys:
@@ -324,10 +327,10 @@ def _other_bounds(space: Any, other_space: Any, part: str = "") -> Iterator[str]
     types = [np.dtype(box.dtype) for box in (space, other_space)]
     rounding = max(_ROUNDING, *(np.finfo(t).eps for t in types if t.kind == "f"), 0.0)
     size = np.where(np.isfinite(bounds), np.abs(bounds), 0.0).max(axis=1, keepdims=True)
-    with np.errstate(invalid="ignore", over="ignore"):  # infinite bounds give NaN
+    with np.errstate(invalid="ignore", over="ignore"):  # inf - inf is NaN: `==` decides then
         is_alike = (bounds == other) | (np.abs(bounds - other) <= rounding * size)
     for i in np.flatnonzero(~is_alike.all(axis=1)):
-        variable = f"variable {i}{part and f' of {part}'}"
+        variable = f"variable {i} of {part}" if part else f"variable {i}"
         ranges = [f"{low:.6g} to {high:.6g}" for low, high in (other[i], bounds[i])]
         yield f"{variable} ({' instead of '.join(ranges)})"
 

@@ -314,33 +314,38 @@ def array_of_names(name: str, stored: Mapping[str, Any]) -> Array:
 
 
 def require_consistent(estimator: Fitted) -> None:
-    """Raise ValueError if the parts of a loaded estimator do not fit together."""
-    held, network = vars(estimator), estimator.network_
+    """Raise ValueError if the attributes of a loaded estimator contradict each other.
+
+    Numbers of units, inputs and bins must agree; held-out residuals, their counts and the
+    steepness of probabilities must be in range.
+    """
+    attributes, network = vars(estimator), estimator.network_
     code = network.input_code
-    seed_of(held["_weight_seed"])
-    if "classes_" in held:
-        n_units = _core.n_units_for(held["_scheme"], len(held["classes_"])) * held["_n_units_each"]
-        fits = network.n_units == n_units
+    seed_of(attributes["_weight_seed"])  # raises for a seed out of range
+    if "classes_" in attributes:
+        n_groups = _core.n_units_for(attributes["_scheme"], len(attributes["classes_"]))
+        fits = network.n_units == n_groups * attributes["_n_units_each"]
     else:
-        n_outputs = held["n_outputs_"]
-        fits = held["output_range_"].shape == (n_outputs, 2) and "_flat" in held
-        fits = fits and network.n_units == n_outputs * held["_counts_of_range"]
-    fits = fits and len(code.codings) == held["n_features_in_"]
+        n_outputs = attributes["n_outputs_"]
+        fits = attributes["output_range_"].shape == (n_outputs, 2) and "_flat" in attributes
+        fits = fits and network.n_units == n_outputs * attributes["_counts_of_range"]
+    fits = fits and len(code.codings) == attributes["n_features_in_"]
     for (mu, nu), modified, modifier in zip(code.pairs, code.modified, code.modifiers, strict=True):
         fits = fits and len(modified) == code.codings[mu].size
         fits = fits and len(modifier) == code.codings[nu].size
     if not fits:
         raise ValueError("its parts do not fit together")
-    if "held_out_residuals_" in held or "held_out_counts_" in held:
-        residuals, counts = held["held_out_residuals_"], held["held_out_counts_"]
+    if "held_out_residuals_" in attributes or "held_out_counts_" in attributes:
+        residuals, counts = attributes["held_out_residuals_"], attributes["held_out_counts_"]
         fits = residuals.dtype == counts.dtype == np.float64 and len(counts) > 0
-        fits = fits and residuals.shape == (len(counts), held["n_outputs_"])
+        fits = fits and residuals.shape == (len(counts), attributes["n_outputs_"])
         fits = fits and counts.ndim == 1 and np.isfinite(counts).all() and counts.min() > 0
         if not (fits and np.isfinite(residuals).all()):
             raise ValueError("its held-out residuals must be finite, with counts above 0")
     low, high = STEEPNESSES
-    if not low <= held.get("steepness_", low) <= high:
-        raise ValueError(f"steepness_ must be within [{low}, {high}], got {held['steepness_']}")
+    steepness = attributes.get("steepness_", low)
+    if not low <= steepness <= high:
+        raise ValueError(f"steepness_ must be within [{low}, {high}], got {steepness}")
 
 
 def require_fitted(coding: Coding, n_units: int) -> Coding:

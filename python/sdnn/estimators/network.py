@@ -109,23 +109,27 @@ def draw_input_code(
     """Draw the patterns of fitted codings.
 
     ``tables="shared"`` draws one table per input, permuted as modifier in each pair; "separate"
-    draws two tables per pair.
+    draws two tables per pair. A pair of equal inputs has the input's pattern alone as code: its
+    modifier is all ones.
     """
+    # Enough for "separate", two a pair, and "shared", one an input and a pair. Files of fitted
+    # estimators depend on the drawn seeds, so their number stays.
     n_seeds = 2 * (len(codings) + len(pairs))
     seeds = iter(np.random.SeedSequence(seed).generate_state(n_seeds, np.uint64).tolist())
     used = sorted({index for pair in pairs for index in pair})
-    plain = {mu: np.ones((codings[mu].size, n_units), np.int8) for mu, nu in pairs if mu == nu}
+    ones = {mu: np.ones((codings[mu].size, n_units), np.int8) for mu, nu in pairs if mu == nu}
     if tables == "separate":
         modified = [codings[mu].patterns(n_units, next(seeds)) for mu, _ in pairs]
         modifiers = [
-            plain[nu] if mu == nu else codings[nu].patterns(n_units, next(seeds))
+            ones[nu] if mu == nu else codings[nu].patterns(n_units, next(seeds))
             for mu, nu in pairs
         ]
         return InputCode(codings, pairs, modified, modifiers)
     shared = {index: codings[index].patterns(n_units, next(seeds)) for index in used}
+    # RandomState takes seeds of 32 bits only.
     orders = [np.random.RandomState(next(seeds) % 2**32).permutation(n_units) for _ in pairs]
     modifiers = [
-        plain[nu] if mu == nu else np.ascontiguousarray(shared[nu][:, order])
+        ones[nu] if mu == nu else np.ascontiguousarray(shared[nu][:, order])
         for (mu, nu), order in zip(pairs, orders, strict=True)
     ]
     return InputCode(codings, pairs, [shared[mu] for mu, _ in pairs], modifiers)

@@ -62,17 +62,18 @@ def select_pairs(
     if len(labels) < FEWEST_SAMPLES or too_few:
         return best[1]
 
-    def part(rows: NDArray[np.bool_]) -> tuple[ArrayLike, Array, Floats | None]:
-        weights_of_rows = None if weights is None else weights[rows]
-        if weights_of_rows is not None and not weights_of_rows.any():
-            weights_of_rows = None  # fit refuses weights that are all 0
-        return _safe_indexing(X, np.flatnonzero(rows)), labels[rows], weights_of_rows
+    def samples(is_chosen: NDArray[np.bool_]) -> tuple[ArrayLike, Array, Floats | None]:
+        """Return X, y and weights of the chosen samples."""
+        chosen_weights = None if weights is None else weights[is_chosen]
+        if chosen_weights is not None and not chosen_weights.any():
+            chosen_weights = None  # fit refuses weights that are all 0
+        return _safe_indexing(X, np.flatnonzero(is_chosen)), labels[is_chosen], chosen_weights
 
-    held = part(is_held)
+    held_out = samples(is_held)
     while True:
         pairs = pairs_among(features, seed)
-        fitted = clone(model).set_params(pairs=pairs).fit(*part(~is_held))
-        score = fitted.score(*held)
+        fitted = clone(model).set_params(pairs=pairs).fit(*samples(~is_held))
+        score = fitted.score(*held_out)
         if score >= best[0]:
             best = score, pairs
         if len(features) <= 2:

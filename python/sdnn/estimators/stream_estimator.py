@@ -204,13 +204,16 @@ class StreamEstimator:
             for name, as_read in self.reads.items()
         }
 
-    def _codings(self, names: list[str], new: list[str]) -> list[Coding]:
-        """Return the codings of new features among all names, and set how their values are read."""
+    def _codings(self, names: list[str], new_names: list[str]) -> list[Coding]:
+        """Return the codings of new features among all names; set their readers in `reads`.
+
+        Every coding accepts missing values, since later samples may lack any feature.
+        """
         frame = pd.DataFrame({name: [x.get(name) for x in self.samples] for name in names})
         coding = known_columns(self.model.coding, names)
         chosen = dict(zip(names, codings_of_columns(coding, names, len(names), frame), strict=True))
         codings: list[Coding] = []
-        for name in new:
+        for name in new_names:
             coding = chosen[name]
             values = [value for x in self.samples if (value := x.get(name)) is not None]
             n_texts = sum(isinstance(value, str) for value in values)
@@ -218,7 +221,7 @@ class StreamEstimator:
                 is_mixed = coding.learns and 0 < n_texts < len(values)
                 self.reads[name] = str if is_mixed else unchanged
             elif n_texts and any(number_of(value) is None for value in values):
-                coding, self.reads[name] = Symbolic(), str
+                coding, self.reads[name] = Symbolic(), str  # words that spell no numbers
             else:
                 self.reads[name] = number_of
             codings.append(coding if isinstance(coding, WithMissing) else WithMissing(base=coding))
@@ -234,9 +237,10 @@ class StreamEstimator:
         counts = collections.Counter(
             name for x in self.samples for name in sorted(x) if x[name] is not None
         )
+        # A twentieth of the samples is enough while there are few of them.
         fewest = min(FEWEST, max(1, len(self.samples) // 20))
-        often = [name for name, count in counts.items() if count >= fewest]
-        names = sorted(often[:MOST_FEATURES])  # independent of the order in dictionaries
+        frequent = [name for name, count in counts.items() if count >= fewest]
+        names = sorted(frequent[:MOST_FEATURES])  # independent of the order in dictionaries
         if not names:
             return
         self.reads, self.categories = {}, {}
@@ -245,8 +249,8 @@ class StreamEstimator:
         entries = [(coding, [name]) for name, coding in zip(names, codings, strict=True)]
         options = {}
         if isinstance(self.model, SDNNClassifier):
-            before = [] if self.fitted is None else self.fitted.classes_.tolist()
-            options["classes"] = np.unique([*before, *self.targets])
+            known_classes = [] if self.fitted is None else self.fitted.classes_.tolist()
+            options["classes"] = np.unique([*known_classes, *self.targets])
         model = clone(self.model).set_params(coding=entries)
         self.fitted = model.partial_fit(frame, targets, **options)
         self.ranges = None

@@ -75,7 +75,7 @@ def sample_weights(
     try:
         each = np.array(weights, dtype=np.float64)
     except (TypeError, ValueError):
-        each = np.array(np.nan)
+        each = np.array(np.nan)  # refused below, as no number in the range
     each = np.full(n_samples, each) if each.ndim == 0 else each
     fits = each.shape == (n_samples,) and np.all((each >= 0) & (each <= LARGEST_WEIGHT))
     expected = f"be a number in [0, {LARGEST_WEIGHT}] for each of {n_samples} samples"

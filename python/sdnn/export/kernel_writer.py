@@ -58,6 +58,8 @@ class KernelWriter(HeaderText):
         """Make the header."""
         tables = Tables(self.name)
         n = len(self.inputs)
+        # C sums the similarities of pairs and divides by the sum of their weights: 2 for equal
+        # inputs, else 1. The sum over all pairs leaves out each pair's factor 1 / 2.
         divisor = 2 * n * (n - 1)
         if not self._has_all_pairs:
             divisor = sum(2 if mu == nu else 1 for mu, nu in self.kernel.pairs)

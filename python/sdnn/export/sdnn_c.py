@@ -190,7 +190,7 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
         return columns
 
     def thresholds(self) -> NDArray[np.int32]:
-        """Return the thresholds of the used units, padded with zeros."""
+        """Return the thresholds of the used units, and 0 for those that fill the last word."""
         thresholds: NDArray[np.int32] = self.network.thresholds()[self.used]
         return np.pad(thresholds, (0, self.n_units - self.used.size))
 

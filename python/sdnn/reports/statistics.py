@@ -128,6 +128,7 @@ def _median(values: FloatArray) -> FloatArray:
     return np.asarray(np.median(values, axis=-1))
 
 
-def _check_finite(done: str, *groups: ArrayLike) -> None:
+def _check_finite(use: str, *groups: ArrayLike) -> None:
+    """Raise ValueError for infinite values; ``use`` is "averaged" or "compared"."""
     if any(np.isinf(np.asarray(values, np.float64)).any() for values in groups):
-        raise ValueError(f"{done} values must not be infinite; cap censored ones first")
+        raise ValueError(f"{use} values must not be infinite; cap censored ones first")

@@ -333,6 +333,7 @@ class ClaimStudy(StudyFile):
         header = ("variant", *(f"claim {number}" for number in numbers))
 
         def rows(cell: Callable[[ClaimOutcome], str]) -> list[tuple[str, ...]]:
+            """Return a row for each variant: its title, and a cell for each claim."""
             return [
                 (titles[variant], *(cell(claims[n]) if n in claims else "-" for n in numbers))
                 for variant, claims in judged.items()

@@ -337,7 +337,7 @@ def _draw_levels(axes: Axes, levels: Sequence[Level]) -> None:
     height = low
     for level in sorted(levels, key=lambda level: level.value):
         height = max(level.value, height)
-        digits = 0 if abs(level.value) >= 10 else 2
+        digits = 0 if abs(level.value) >= 10 else 2  # three significant digits at least
         axes.annotate(
             f"{level.title} {level.value:,.{digits}f}", (1.01, height), color=FAINT, fontsize=8,
             xycoords=axes.get_yaxis_transform(), va="center", annotation_clip=False,

@@ -62,7 +62,11 @@ N_POINTS = 60
 
 
 class RangeUse(NamedTuple):
-    """The range of an input, the share of it that nine tenths of the states use, those outside."""
+    """An input's range from `low` to `high`, and how visited states use it.
+
+    `within` is the share of the range that the middle nine tenths of the states span, `outside`
+    the share of states beyond the range.
+    """
 
     low: float
     high: float
@@ -208,6 +212,7 @@ class Inspection:
             float(bounds[agent_input.columns[0]]) for bounds in self.agent.observation_range
         )
         numbers = agent_input.numbers(self.states)
+        # Percentiles 5 and 95 enclose nine tenths, so that rare extremes do not count as use.
         first, last = np.clip(np.percentile(numbers, (5, 95)), low, high).tolist()
         outside = float(((numbers < low) | (numbers > high)).mean())
         return RangeUse(low, high, (last - first) / (high - low), outside)

@@ -113,10 +113,10 @@ class Run(Displayed):
             raise RunError(f"{place} holds no run: there is no {path}")
         goals = ConfigFile.read(path).values.get("goals", [])
         try:
-            made = [read_table(Goal, goal) for goal in goals]
+            checked_goals = [read_table(Goal, goal) for goal in goals]
         except (ConfigError, TypeError) as error:
             raise ConfigError("goals", f"must be a list of goals: {error}", str(path)) from error
-        return cls(place, read_spec(path), made)
+        return cls(place, read_spec(path), checked_goals)
 
     def _facts(self) -> dict[str, object]:
         return {

@@ -110,17 +110,19 @@ def forecast(study: Study, out: Path, jobs: int) -> dict[str, object]:
     probes: dict[tuple[str, str, bool], tuple[float, int]] = {}
     for pair in study.pairs:
         keys, spec = study.keys(*pair), study.combinations[pair].spec
-        left = [key for key in keys if key not in stored]
+        to_run = [key for key in keys if key not in stored]
         times = [stored[key] for key in keys if key in stored]
         source = f"{len(times)} stored trial{'s' if len(times) > 1 else ''}"
         if not times:
-            kind = (*keys[0][:2], spec.budget.steps is None)  # a rate is by the budget's unit
-            if kind not in probes:
-                probes[kind] = _probe(PlannedTrial(keys[0], spec))
-            rate, n_episodes = probes[kind]
+            # Seeds and variants of equal settings share a probe, whose rate is seconds per step,
+            # or per episode where the budget counts these.
+            probe_key = (*keys[0][:2], spec.budget.steps is None)
+            if probe_key not in probes:
+                probes[probe_key] = _probe(PlannedTrial(keys[0], spec))
+            rate, n_episodes = probes[probe_key]
             times, source = [rate * spec.length], f"the first {n_episodes} episodes of one"
         seconds = sum(times) / len(times)
-        missing |= dict.fromkeys(left, (seconds, spec.is_compiled))
+        missing |= dict.fromkeys(to_run, (seconds, spec.is_compiled))
         works.append(
             {
                 "case": pair[0],
@@ -130,7 +132,7 @@ def forecast(study: Study, out: Path, jobs: int) -> dict[str, object]:
                 "episodes": spec.budget.episodes,
                 "config_hash": spec.config_hash,
                 "planned": len(keys),
-                "stored": len(keys) - len(left),
+                "stored": len(keys) - len(to_run),
                 "seconds_of_a_trial": seconds,
                 "source": source,
             }
