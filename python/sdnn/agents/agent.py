@@ -384,9 +384,9 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
 
     def _restore(self, **parts: Mapping[str, Array]) -> None:
         """Replace parts of the state; ValueError if they do not fit, and nothing changes."""
-        kept = {k: a for k, a in self.state().items() if k.partition(".")[0] not in parts}
+        others = {k: a for k, a in self.state().items() if k.partition(".")[0] not in parts}
         new = {f"{part}.{name}": a for part, state in parts.items() for name, a in state.items()}
-        self._controller.restore(kept | new)
+        self._controller.restore(others | new)
 
     @classmethod
     @explained

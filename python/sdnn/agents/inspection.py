@@ -90,11 +90,11 @@ class AgentInput:
         return float(np.median(numbers))
 
     def limits(self, states: Floats) -> tuple[float, float]:
-        """Return the range of the states met, without their outermost hundredth at each end."""
+        """Return the range of the states met, without the lowest and the highest hundredth."""
         if self.type == "angle":
             return -180.0, 180.0
         low, high = np.percentile(self.numbers(states), (1, 99)).tolist()
-        return (low, high) if low < high else (low - 0.5, high + 0.5)
+        return (low, high) if low < high else (low - 0.5, high + 0.5)  # figures need a width
 
 
 def variable_names(space: Space, prefix: str = "") -> list[str]:
@@ -262,7 +262,7 @@ class Reader:
         return [np.where(flags, part, -np.inf) for flags, part in zip(masks, parts, strict=True)]
 
     def _parts(self, state: Floats) -> list[Floats]:
-        """Return the values of all actions of each dimension, or what is known of the state."""
+        """Return the values of all actions of each dimension, or an actor-critic's state value."""
         if self.agent.kind == "actor-critic":
             return [np.array([self._core.state_value(state)])]
         return [self._core.values(state, d) for d in range(self._n_dimensions)]
@@ -375,6 +375,7 @@ def influences(
     """
     generator = np.random.default_rng(seed)
     n_used = max(1, sum(agent_input.is_used for agent_input in inputs))
+    # Fewer than 50 states would leave influences to chance, however slow they are to read.
     states = states.thinned(max(50, reader.most_reads // (N_SHUFFLES * n_used)))
     before = reader.read(states)
     known = before.allowed.any(axis=0)

@@ -50,8 +50,8 @@ def quantile_knots(column: NDArray[np.float64]) -> Knots:
     ranks = np.cumsum(counts) - counts / 2
     levels = (ranks - ranks[0]) / (ranks[-1] - ranks[0])
     if len(values) > MAX_KNOTS:
-        kept = np.unique(np.searchsorted(levels, np.linspace(0, 1, MAX_KNOTS)))
-        values, levels = values[kept], levels[kept]
+        chosen = np.unique(np.searchsorted(levels, np.linspace(0, 1, MAX_KNOTS)))
+        values, levels = values[chosen], levels[chosen]
     return tuple(zip(values.tolist(), levels.tolist(), strict=True))
 
 
@@ -178,8 +178,9 @@ class RandomInverse(Ranged):
         if self.n_flipped is not None:
             flipped = whole("n_flipped", self.n_flipped, 1, most)
         elif n_bins is not None:
-            kept = math.exp(-1 / (n_bins * self.length_scale))
-            flipped = min(most, max(1, round(n_units * (1 - kept) / 4)))
+            # Flipping f units of each sign a bin takes 4 f / n from the correlation of neighbours.
+            correlation = math.exp(-1 / (n_bins * self.length_scale))
+            flipped = min(most, max(1, round(n_units * (1 - correlation) / 4)))
         else:
             flipped = max(1, math.ceil(n_units / (4 * self.length_scale * FINE)))
             expected = f"be at least {1 / (2 * FINE)}"
@@ -312,6 +313,6 @@ class Circular(Anchored):
         if np.isinf(values).any():
             raise ValueError("Input contains infinity, which has no place on a circle")
         turns = (values - self.origin) / self.period
-        # Rounding puts values a period apart into the same bin, also at the limits of bins.
+        # Rounding to 9 digits puts values a period apart into the same bin, also at bins' limits.
         positions = np.round((turns - np.floor(turns)) * self.size, 9)
         return positions.astype(np.int32) % np.int32(self.size)

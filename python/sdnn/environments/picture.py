@@ -41,14 +41,15 @@ class AcrobotMotion:
 
     def __init__(self, config: AcrobotConfig) -> None:
         n_steps = round(config.decision_interval / config.integration_step)
+        # A quotient that rounding left just below a whole number counts as that number.
         most = max(1, int(_LONGEST / config.integration_step * (1.0 + 1e-9)))
         n_joined = next(n for n in range(min(most, n_steps), 0, -1) if n_steps % n == 0)
         self.interval = n_joined * config.integration_step
         self._n_intervals = n_steps // n_joined
-        parts = dataclasses.replace(
+        config_between = dataclasses.replace(
             config, decision_interval=self.interval, max_decisions=self._n_intervals
         )
-        self._acrobot = _core.Acrobot(parts)
+        self._acrobot = _core.Acrobot(config_between)
         self._tests_goal = config.goal_test == "every_step"
 
     def between(
@@ -160,14 +161,16 @@ class AcrobotPicture:
             self._write(-16, 16, "goal reached", self._large_font, _GOAL)
 
     def _draw_link(self, start: complex, end: complex, colour: Colour) -> None:
+        """Draw a link 0.1 m wide with round ends."""
         side = 0.05j * (end - start) / abs(end - start)
         self._polygon((start + side, end + side, end - side, start - side), colour)
         self._disc(start, 0.05, colour)
         self._disc(end, 0.05, colour)
 
     def _draw_torque(self, centre: complex, torque: float) -> None:
+        """Draw an arrow around a joint, as long as the torque is large; lengths are in metres."""
         sweep = _FULL_TORQUE_ARC * torque / self._config.max_torque
-        if abs(sweep) < 0.02:
+        if abs(sweep) < 0.02:  # radians: too short to be seen
             return
         angles = np.linspace(-sweep / 2, sweep / 2, 2 + int(40 * abs(sweep))) + math.pi / 2
         for angle in angles:

@@ -210,7 +210,7 @@ class BaseSDNN(Fitted, CodedInputs):
         targets = self._targets(observed, at_once=True)
         bins = self.network_.input_code.bins(table)
         share = self.validation_fraction if self.early_stopping else 0.0
-        held, kept = held_out(share, random, len(table))
+        held, learned_rows = held_out(share, random, len(table))
 
         def score() -> float:
             weights_of_held = None if weights is None else weights[held]
@@ -218,7 +218,7 @@ class BaseSDNN(Fitted, CodedInputs):
 
         def train(rows: Rows, max_iter: int, n_averaged: int) -> tuple[Trainer, History]:
             weights_of_rows = None if weights is None else weights[rows]
-            scored = score if self.early_stopping and rows is kept else None
+            scored = score if self.early_stopping and rows is learned_rows else None
             times = self._presentations(targets[rows], weights_of_rows)
             n_samples = len(rows)
             in_blocks = self.shuffle and times is None and n_samples > LARGE_SAMPLE
@@ -228,15 +228,16 @@ class BaseSDNN(Fitted, CodedInputs):
             # few epochs.
             n_epochs = min(max_iter, 2) if in_blocks else max_iter
             learned = self._targets_to_learn(bins[rows], targets[rows], weights_of_rows)
-            part = 0.5 if len(table) > self._largest_full_sample else 1.0
-            trainer = self._trainer(bins[rows], learned, n_epochs, part)
+            # Networks that learn a part of very many samples correct half the share.
+            part_of_share = 0.5 if len(table) > self._largest_full_sample else 1.0
+            trainer = self._trainer(bins[rows], learned, n_epochs, part_of_share)
             return trainer, run_epochs(
                 self, trainer, n_samples, max_iter, random, scored, times, n_averaged, in_blocks
             )
 
         is_refitted = self.refit and self.early_stopping
         n_averaged = 1 if is_refitted else self.n_averaged_epochs
-        trainer, history = train(kept, most_epochs(self.max_iter, len(table)), n_averaged)
+        trainer, history = train(learned_rows, most_epochs(self.max_iter, len(table)), n_averaged)
         self.n_iter_ = len(history.n_corrected)
         self.n_corrected_ = np.array(history.n_corrected, dtype=np.int64)
         self.validation_scores_ = np.array(history.scores)

@@ -61,8 +61,8 @@ def learn_without_fifth(
     # The smaller network corrects as large a share of its errors.
     if len(targets) > fitted._largest_full_sample:
         model._largest_full_sample = 0
-    kept, held = np.flatnonzero(~is_held), np.flatnonzero(is_held)
-    weights_of_kept = None if sample_weight is None else weights[kept]
-    model.fit(samples_in(X, kept), targets[kept], weights_of_kept)
+    learned, held = np.flatnonzero(~is_held), np.flatnonzero(is_held)
+    learned_weights = None if sample_weight is None else weights[learned]
+    model.fit(samples_in(X, learned), targets[learned], learned_weights)
     weights_of_held = weights[held].astype(np.float64)
     return HeldOut(model, held, samples_in(X, held), targets[held], weights_of_held)

@@ -44,7 +44,7 @@ def grow(
     network, before = model.network_, model.network_.input_code
     n_before, n_units = len(before.codings), before.core.n_units
     n_patterns = sum(coding.size for coding in before.codings)  # part of the seed: grows each time
-    random = np.random.RandomState((model._weight_seed + n_patterns) % 2**32)
+    random = np.random.RandomState((model._weight_seed + n_patterns) % 2**32)  # seeds of 32 bits
     added = pairs_of_new(n_before, len(new), random)
     pairs = [*before.pairs, *added]
     if len(pairs) * n_units > most_columns:

@@ -260,8 +260,8 @@ class InputChoice:
         halvings = []
         while len(features := candidate.inputs.features) > 2:
             order = np.argsort(-self._importances(candidate), kind="stable")
-            kept = np.sort(features[order[: (len(features) + 1) // 2]])
-            candidate = self._solve(dataclasses.replace(candidate.inputs, features=kept))
+            half = np.sort(features[order[: (len(features) + 1) // 2]])
+            candidate = self._solve(dataclasses.replace(candidate.inputs, features=half))
             halvings.append(candidate)
         return halvings
 
@@ -340,5 +340,6 @@ class InputChoice:
             )
             change += (up - down) * self._slopes(candidate, present)
         steps = (above - below) / coding.size / self._deviations[feature]
+        # Where the step is 0, the change is 0, too: the least divisor gives a slope of 0.
         slopes: Floats = change @ candidate.solution.dual / np.maximum(steps, 1e-9)[:, None]
         return slopes

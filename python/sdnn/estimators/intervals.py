@@ -52,8 +52,8 @@ def error_bounds(sizes: Floats, counts: Floats, coverage: float) -> Floats:
     bounds = []
     for column in sizes.T:
         order = np.argsort(column, kind="stable")
-        place = int(np.searchsorted(np.cumsum(counts[order]), needed))
-        bounds.append(column[order[min(place, len(order) - 1)]])  # sums may be rounded
+        rank = int(np.searchsorted(np.cumsum(counts[order]), needed))
+        bounds.append(column[order[min(rank, len(order) - 1)]])  # sums may be rounded
     return np.array(bounds)
 
 
@@ -100,8 +100,8 @@ class FollowedErrors:
         n_errors = len(self.ordered)
         if n_errors == 0:
             return 0.0
-        place = math.ceil(self.level * (n_errors + 1) * ROUNDED_DOWN) - 1
-        return self.ordered[min(max(place, 0), n_errors - 1)]
+        rank = math.ceil(self.level * (n_errors + 1) * ROUNDED_DOWN) - 1
+        return self.ordered[min(max(rank, 0), n_errors - 1)]
 
     def learn(self, error: float) -> None:
         """Learn the size of an error, which the next half width was to exceed."""

@@ -45,8 +45,8 @@ def units_for_pairs(n_pairs: int, is_large: bool = False) -> int:
 
 def code_bytes(codings: Sequence[Coding], pairs: Sequence[tuple[int, int]], n_units: int) -> int:
     """Estimate the bytes that drawing and keeping the patterns takes."""
-    of_pairs = sum(codings[mu].size + codings[nu].size for mu, nu in pairs)
-    return int(of_pairs * n_units * 9 / 8)  # each unit is a byte here and a bit in the core
+    n_patterns = sum(codings[mu].size + codings[nu].size for mu, nu in pairs)
+    return int(n_patterns * n_units * 9 / 8)  # each unit is a byte here and a bit in the core
 
 
 class InputCode(InputBins):
@@ -121,8 +121,7 @@ def draw_input_code(
     if tables == "separate":
         modified = [codings[mu].patterns(n_units, next(seeds)) for mu, _ in pairs]
         modifiers = [
-            ones[nu] if mu == nu else codings[nu].patterns(n_units, next(seeds))
-            for mu, nu in pairs
+            ones[nu] if mu == nu else codings[nu].patterns(n_units, next(seeds)) for mu, nu in pairs
         ]
         return InputCode(codings, pairs, modified, modifiers)
     shared = {index: codings[index].patterns(n_units, next(seeds)) for index in used}

@@ -145,26 +145,27 @@ def low_rank_diagonal(
 
 def solve(problem: Diagonal, samples: Samples, alpha: float | None) -> Solution:
     """Solve the problem for an alpha, by default the one with the least leave-one-out error."""
-    left = samples[problem.rows]
-    total, roots = samples.weights.sum(), np.sqrt(left.weights)[:, None]
-    targets = roots * (left.targets - samples.mean)
-    variances = np.square(targets).sum(axis=0) / left.weights.sum()
+    judged = samples[problem.rows]  # those whose leave-one-out errors decide
+    total, roots = samples.weights.sum(), np.sqrt(judged.weights)[:, None]
+    targets = roots * (judged.targets - samples.mean)
+    variances = np.square(targets).sum(axis=0) / judged.weights.sum()
     variances[variances == 0] = 1.0
     squares = np.square(problem.features)
     best = np.inf, 0.0, problem.moments, targets
     for penalty in problem.values.sum() * ALPHAS if alpha is None else [alpha]:
         shrinkage = 1 / (problem.values + penalty)
         coefficients = shrinkage[:, None] * problem.moments
-        leverages = squares @ shrinkage + left.weights / total
-        kept = np.maximum(1 - left.shares * leverages, NEGLIGIBLE)
-        residuals = (targets - problem.features @ coefficients) / kept[:, None]
-        error = float((np.square(residuals).sum(axis=0) / variances).mean() / left.weights.sum())
+        leverages = squares @ shrinkage + judged.weights / total
+        # A residual over 1 - leverage is the residual of a fit without the sample.
+        divisors = np.maximum(1 - judged.shares * leverages, NEGLIGIBLE)
+        residuals = (targets - problem.features @ coefficients) / divisors[:, None]
+        error = float((np.square(residuals).sum(axis=0) / variances).mean() / judged.weights.sum())
         if error < best[0]:
             best = error, float(penalty), coefficients, residuals
     error, penalty, coefficients, residuals = best
     dual = problem.to_dual @ coefficients
     intercept = samples.mean - problem.kernel_mean @ dual
-    left_out = left.targets - residuals / np.where(roots > 0, roots, 1)
+    left_out = judged.targets - residuals / np.where(roots > 0, roots, 1)
     return Solution(penalty, error, dual, intercept, left_out, problem.rows)
 
 

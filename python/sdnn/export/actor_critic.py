@@ -255,8 +255,10 @@ class ActorCriticLearner(Learner[_core.LinearSDNN], ActorCriticWriter):
 
     def _ram_bytes(self, n_weights: int) -> int:
         """Return the bytes of the struct, where numbers lie at multiples of their sizes."""
-        n_bytes = 8 * 2 + 16 + 24 + 32 * 2 + 4 * 2 * n_weights + 4 * 3
+        n_bytes = 8 * 2 + 16 + 24 + 32 * 2  # 64-bit numbers, scales of errors, rewards; generators
+        n_bytes += 4 * 2 * n_weights + 4 * 3  # weights and traces, numbers of 32 bits
         n_last = self.n_inputs if self.codes_missing else self.n_observed
         n_bytes = self.with_states(n_bytes, 4 * n_last, next_bins=False)
-        n_bytes += 2 * self.code_bytes() + 3 + self.n_critic_rows + sum(self.n_rows())
+        n_flags = 3 + self.n_critic_rows + sum(self.n_rows())  # a byte each
+        n_bytes += 2 * self.code_bytes() + n_flags
         return rounded_up(n_bytes, 8)

@@ -65,8 +65,8 @@ class EstimatorLearner(EstimatorWriter):
 
     def ram_bytes(self) -> int:
         """Return the bytes of the struct."""
-        n_bytes = 0 if self.is_classifier else 16 * self.model.n_outputs_
-        n_bytes += self.n_units * (4 + 2 * self.code.core.n_columns + 2)
+        n_bytes = 0 if self.is_classifier else 16 * self.model.n_outputs_  # ranges: two doubles
+        n_bytes += self.n_units * (4 + 2 * self.code.core.n_columns + 2)  # threshold and weights
         return rounded_up(n_bytes, 4 if self.is_classifier else 8)
 
     def stack_bytes(self) -> int:

@@ -96,8 +96,8 @@ class EstimatorWriter(HeaderText):
         rows, excesses = [], list[str]()
         for number, network in enumerate(self.networks):
             weights = require_small(network.layer.weights)
-            in_bytes, more = self.split(weights)
-            words, n_bytes = weight_words(in_bytes)
+            limited, excesses_of_network = self.split(weights)
+            words, n_bytes = weight_words(limited)
             thresholds = network.layer.thresholds
             padded = np.pad(thresholds, (0, -len(thresholds) % 4))
             tables.add("uint32_t", f"weights_{number}", words, "Weights, those of four units each.")
@@ -105,16 +105,16 @@ class EstimatorWriter(HeaderText):
             tables.add("uint8_t", f"weight_bytes_{number}", n_bytes)
             parts = ("weights", "thresholds", "weight_bytes")
             names = ", ".join(f"{self.name}_{part}_{number}" for part in parts)
-            rows.append(f"{{{names}, {len(excesses)}, {len(more)}}},")
-            excesses += more
+            rows.append(f"{{{names}, {len(excesses)}, {len(excesses_of_network)}}},")
+            excesses += excesses_of_network
         tables.n_bytes += _EXCESS_BYTES * len(excesses) + _NETWORK_BYTES * len(rows)
         macros = {"N_NETWORKS": len(rows), "NETWORKS": rows, "HAS_EXCESSES": int(bool(excesses))}
         return {**macros, "EXCESSES": in_lines(excesses)} if excesses else macros
 
     def split(self, weights: NDArray[np.int32]) -> tuple[NDArray[np.int32], list[str]]:
-        """Limit weights to a byte where few of four units exceed it, which takes less flash.
+        """Limit the weights of four units to a byte where few exceed it, which takes less flash.
 
-        Returns the weights, and the structs in C of what is beyond the limits.
+        Returns the weights, and C structs (unit, pair, column of the pair, excess) of the rest.
         """
         m, limited, rows = self.pairs.m, weights.copy(), []
         if max(len(weights), len(self.code.pairs)) > _MOST_16_BITS:
@@ -124,6 +124,7 @@ class EstimatorWriter(HeaderText):
             clipped = four.clip(-128, 127)
             excess = four - clipped
             units, columns = np.nonzero(excess)
+            # The alternative is a second byte for each of the four units' weights.
             if _EXCESS_BYTES * len(units) < 4 * weights.shape[1]:
                 limited[first : first + 4] = clipped
                 places = zip(units.tolist(), columns.tolist(), strict=True)
@@ -160,7 +161,7 @@ def require_small(weights: NDArray[np.int32]) -> NDArray[np.int32]:
 
 
 def in_lines(rows: Iterable[str]) -> list[str]:
-    """Return rows of C in few lines.
+    """Join rows of C, five a line.
 
     >>> in_lines(["{1,2},"] * 3)
     ['{1,2},{1,2},{1,2},']

@@ -91,9 +91,9 @@ class StateHistory:
     def function_bytes(self) -> int:
         """The bytes of constants of sine, cosine and atan2, where they are used."""
         kinds = {source.kind for source in self.inputs} if self.is_needed else set[str]()
-        n_numbers = 23 if "angle" in kinds else 0
+        n_numbers = 23 if "angle" in kinds else 0  # coefficients of atan2
         if self.kind == "observer" and kinds & {"angle", "circular"}:
-            n_numbers += 12
+            n_numbers += 12  # coefficients of sine and cosine
         return 8 * n_numbers
 
     @property

@@ -87,8 +87,8 @@ class Learner(Writer[Network]):
             state["n_random_left"] = np.array(n_left, np.int32)
         self.recall(image, state)
         names = [name for name in fields if name.startswith(SCALE)]
-        kept = {name: np.array(image[name]) for name in names if image[name] != NONE}
-        scale = {name.removeprefix(f"{SCALE}."): number for name, number in kept.items()}
+        known = {name: np.array(image[name]) for name in names if image[name] != NONE}
+        scale = {name.removeprefix(f"{SCALE}."): number for name, number in known.items()}
         self.agent._restore(agent=state, reward_scale=scale)
 
     def tie_rule(self) -> str:

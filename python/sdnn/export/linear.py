@@ -76,7 +76,10 @@ class LinearWriter(Writer[_core.LinearSDNN]):
         return tables
 
     def rule_of_values(self) -> Data:
-        """Return the settings by which an agent with traces learns values."""
+        """Return the settings by which an agent with traces learns values, as whole numbers.
+
+        The discount counts units of 2^-15, the decay of traces units of 2^-13.
+        """
         learning, discount = self.agent.learning, round(self.agent.learning.discount * 32768)
         return {
             "DISCOUNT": discount,
@@ -86,7 +89,7 @@ class LinearWriter(Writer[_core.LinearSDNN]):
         }
 
     def rates(self, macro: str, first: float, last: float | None) -> dict[str, int]:
-        """Return a rate at the beginning and at the end of the schedule."""
+        """Return a rate at the beginning and at the end of the schedule, in units of 2^-16."""
         last = first if last is None else last
         return {f"{macro}_FIRST": round(first * _ONE), f"{macro}_LAST": round(last * _ONE)}
 
@@ -105,5 +108,6 @@ class LinearWriter(Writer[_core.LinearSDNN]):
     def code_bytes(self) -> int:
         """Return the bytes of a state's code in memory."""
         code = self.code()
-        n_bytes = 8 + 4 * self.n_inputs + code.column_bytes * code.most_columns
+        n_counts, n_bins = 2, self.n_inputs  # of 4 bytes each
+        n_bytes = 4 * (n_counts + n_bins) + code.column_bytes * code.most_columns
         return rounded_up(n_bytes, 4)

@@ -119,8 +119,9 @@ def _sizes(config: NewConfig) -> Sequence[NewConfig]:
         if config.n_pattern_units > 0:
             return [config]
         return [replace(config, n_pattern_units=n) for n in range(32, 769, 16)]
-    # Longer patterns improve learning more than further hidden units.
-    parts = [*((m, 1) for m in range(3, 8)), *((8, n) for n in range(1, 13))]
+    # Eighths of the patterns and twelfths of the units: patterns grow to their full length first,
+    # since longer patterns improve learning more than further hidden units.
+    fractions = [*((m, 1) for m in range(3, 8)), *((8, n) for n in range(1, 13))]
     return [
         replace(
             config,
@@ -128,5 +129,5 @@ def _sizes(config: NewConfig) -> Sequence[NewConfig]:
             n_hidden_units=max(1, config.n_hidden_units * n // 12),
             n_active_units=max(1, config.n_active_units * n // 12),
         )
-        for m, n in parts
+        for m, n in fractions
     ]

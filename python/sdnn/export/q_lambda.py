@@ -26,7 +26,7 @@ class QLambdaWriter(LinearWriter):
     def tolerance(self) -> tuple[int, int]:
         """Return the tolerance of ties as (number, exponent): the number is below 2^62."""
         fraction, exponent = math.frexp(self.agent.learning.tie_tolerance)
-        return int(fraction * _MOST_TOLERANCE), exponent - 62
+        return int(fraction * _MOST_TOLERANCE), exponent - 62  # the fraction is in [0.5, 1)
 
     def header(self) -> CHeader:
         """Make the header."""
@@ -156,8 +156,9 @@ class QLambdaLearner(Learner[_core.LinearSDNN], QLambdaWriter):
 
     def _ram_bytes(self, n_weights: int) -> int:
         """Return the bytes of the struct, where numbers lie at multiples of their sizes."""
-        n_bytes = 8 * 3 + 24 + 32 * 4 + 4 * (2 + self.averages) * n_weights + 4 * 10
-        n_bytes += 4 * 2 * self.n_dimensions
+        n_bytes = 8 * 3 + 24 + 32 * 4  # numbers of 64 bits, reward scale, generators
+        n_bytes += 4 * (2 + self.averages) * n_weights + 4 * 10  # weights, traces; 32-bit numbers
+        n_bytes += 4 * 2 * self.n_dimensions  # the action, and the one that is repeated
         n_bytes = self.with_states(n_bytes, 4 * self.n_inputs, next_bins=True)
-        n_bytes += 2 * self.code_bytes() + 5 + sum(self.n_rows())
+        n_bytes += 2 * self.code_bytes() + 5 + sum(self.n_rows())  # codes, flags, flags of rows
         return rounded_up(n_bytes, 8)

@@ -250,13 +250,15 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
             state[f"n_step_buffer.{name}"] = state[f"n_step_buffer.{name}"][:0]
         words = image["weights"].reshape(-1, self.code.n_columns)
         lanes = words.copy().view(np.uint8).reshape(len(words), -1, 4).transpose(0, 2, 1)
+        # An image has weights as bytes plus 128, those of four units in a word.
         columns = lanes.reshape(self.n_units, -1)[: self.used.size].astype(np.int32) - 128
         if not 0.0 <= image["progress"] <= 1.0 or columns.min() < -MOST_WEIGHT:
             raise ValueError("progress must be 0 to 1, and weights -127 to 127")
         known = {"thresholds": image["thresholds"], "weights": self.code.unpaired(columns)}
         for name, values in known.items():
-            part = state[f"action_value.{name}"] = state[f"action_value.{name}"].copy()
-            part[self.used] = values[: self.used.size]
+            of_all_units = state[f"action_value.{name}"].copy()
+            of_all_units[self.used] = values[: self.used.size]
+            state[f"action_value.{name}"] = of_all_units
 
     def restore(self, whole: bytes) -> None:
         """Set the agent's state from an image; ValueError if it is damaged or another agent's."""
@@ -264,6 +266,7 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
         self.agent.progress = float(np.frombuffer(whole, self.layout(), 1)["progress"][0])
 
     def _rewards(self, state: Data) -> Array:
+        """Return the pending rewards as fixed-point numbers of 32 bits."""
         scaled: Array = np.round(state["range.rewards"] * 2.0**self.fraction_bits)
         clipped: Array = np.clip(scaled, -(2**31), 2**31 - 1).astype("<i4")
         return clipped
@@ -366,11 +369,12 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
     def _ram_bytes(self) -> int:
         """Return the size of the C struct, with numbers aligned to their sizes."""
         n_steps = self.agent.learning.n_steps
-        n_bytes = 5 * 32 + 24 + 5 * 8 + (n_steps + 1) * self._state_bytes() + 12 * n_steps
-        n_bytes += 4 * self.n_words + 4 * self.n_units
-        n_bytes += 4 * (10 + self.n_inputs + self.n_observed)
-        n_bytes += 4 * (self.n_observed + 1) * self.history.holds
-        if self.adapts:
+        n_bytes = 5 * 32 + 24 + 5 * 8  # generators, reward scale, numbers of 64 bits
+        n_bytes += (n_steps + 1) * self._state_bytes() + 12 * n_steps  # pending transitions
+        n_bytes += 4 * self.n_words + 4 * self.n_units  # weights and thresholds
+        n_bytes += 4 * (10 + self.n_inputs + self.n_observed)  # numbers of 32 bits, next state
+        n_bytes += 4 * (self.n_observed + 1) * self.history.holds  # the held readings
+        if self.adapts:  # 64-bit numbers, returns, two horizons of rewards, three 32-bit numbers
             n_bytes += 5 * 8 + 8 * _MOST_RETURNS + 8 * self.horizon + 12
         return rounded_up(n_bytes, 8)
 
@@ -391,6 +395,7 @@ def _seeded(seed: int, stream: int) -> list[int]:
     mixed = seed
 
     def split_mix() -> int:
+        """Return the next number of SplitMix64, with the constants of its authors."""
         nonlocal mixed
         mixed = mixed + 0x9E3779B97F4A7C15 & _WORD
         z = (mixed ^ mixed >> 30) * 0xBF58476D1CE4E5B9 & _WORD

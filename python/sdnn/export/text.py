@@ -253,15 +253,16 @@ def by_dimension(actions: Array) -> Array:
 def weight_words(weights: NDArray[np.int32]) -> tuple[Array, Array]:
     """Pack weights (n, D) as bytes plus 128, those of four units in a word.
 
-    Returns the words (D,) of each four units, high bytes before low ones where one is needed, and
-    how many bytes that are. n is filled up with zeros.
+    Each four units have a row of D words with the low bytes of their weights, after a row with the
+    high bytes if one is not 0. Returns all words in a row, and the number of rows, 1 or 2, of each
+    four units. Missing units of the last four have the weight 0.
     """
     padded = np.pad(weights, ((0, -len(weights) % 4), (0, 0)))
     low = (padded + 128) % 256 - 128
     both = np.stack([(padded - low) // 256, low], axis=1) + 128
     fours = both.reshape(len(padded) // 4, 4, 2, -1).transpose(0, 2, 3, 1).astype(np.uint8)
     words = np.ascontiguousarray(fours).view("<u4")[..., 0]
-    is_high = (words[:, 0] != 0x80808080).any(axis=1)
+    is_high = (words[:, 0] != 0x80808080).any(axis=1)  # four bytes of 0 plus 128
     is_needed = np.stack([is_high, np.ones_like(is_high)], axis=1)
     return words[is_needed].reshape(-1), 1 + is_high
 

@@ -143,9 +143,9 @@ def curves_of(runs: Sequence[Run]) -> tuple[list[Curve], list[str]]:
     Runs that differ in their seeds only share a curve, but keep their episodes. RunError if there
     is nothing to draw yet, or rows cannot be read.
     """
-    made = [_curves_of_group(group) for group in groups_of(runs)]
-    curves = [curve for run_curves, _ in made for curve in run_curves]
-    notes = [note for _, run_notes in made for note in run_notes]
+    curves_and_notes = [_curves_of_group(group) for group in groups_of(runs)]
+    curves = [curve for group_curves, _ in curves_and_notes for curve in group_curves]
+    notes = [note for _, group_notes in curves_and_notes for note in group_notes]
     if not curves:
         raise RunError("; ".join(notes) + ": nothing to draw")
     return curves, notes
@@ -320,6 +320,7 @@ def _draw_curve(axes: Axes, curve: Curve, color: str) -> None:
 
 
 def _look(kind: Kind, n_points: int = 0) -> dict[str, object]:
+    """Return matplotlib's properties of a curve; very many points become a picture in SVG files."""
     if kind == "return":
         is_picture = n_points > _MANY_POINTS
         return {"ls": "", "marker": ".", "ms": 2.5, "alpha": 0.3, "rasterized": is_picture}

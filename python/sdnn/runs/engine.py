@@ -408,8 +408,8 @@ def _run_team(
     planned: Sequence[PlannedTrial], messages: SimpleQueue[Message | None], stop: threading.Event
 ) -> None:
     """Run trials as a team in a worker thread; after an error, run each unfinished one alone."""
-    left = dict.fromkeys(planned)
-    if len(left) > 1 and not stop.is_set():
+    unfinished = dict.fromkeys(planned)
+    if len(unfinished) > 1 and not stop.is_set():
         with suppress(BaseException):  # the trial that raised it raises it again alone
             team = Team(planned)
             for _ in _run_in_chunks(team):
@@ -417,10 +417,10 @@ def _run_team(
                     messages.put(Advanced(member, running.episode))
                 for finished in team.take_finished():
                     messages.put(finished)
-                    del left[finished.planned]
+                    del unfinished[finished.planned]
                 if stop.is_set():
                     break
-    for trial in left:
+    for trial in unfinished:
         _run_one(trial, messages, stop)
 
 

@@ -279,7 +279,7 @@ class Run(Displayed):
     @property
     def fresh_seed(self) -> int:
         """A seed for evaluations whose episodes differ from all episodes of the run."""
-        return (self.spec.seed + 2**63) % 2**64
+        return (self.spec.seed + 2**63) % 2**64  # half of all seeds apart
 
     @property
     def key(self) -> TrialKey:

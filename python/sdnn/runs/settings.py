@@ -78,9 +78,9 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     def __post_init__(self) -> None:
         for name, kind in _types_of_fields(type(self)).items():
             value = getattr(self, name)
-            made = convert_value(kind, value, name)
-            if made is not value:
-                msgspec.structs.force_setattr(self, name, made)
+            converted = convert_value(kind, value, name)
+            if converted is not value:
+                msgspec.structs.force_setattr(self, name, converted)
 
     def replace(self: AnySettings, **changes: object) -> AnySettings:
         """Return a copy with other values of some fields, which are checked."""
@@ -130,14 +130,14 @@ def convert_value(kind: object, value: object, key: str) -> Any:
                 for name, item in value.items():
                     convert_value(get_args(form)[1], item, f"{key}.{name}")
     try:
-        made = msgspec.convert(value, kind)
+        converted = msgspec.convert(value, kind)
     except (msgspec.ValidationError, UnicodeEncodeError) as error:  # a command line has any bytes
         text, _, path = str(error).partition(" - at `$")
         problem = _expected_value(_alternatives(kind) if not path else (), text)
         raise ConfigError(key + path[:-1], f"{problem}, got {shown(value)}") from None
-    if isinstance(made, float) and not math.isfinite(made):
-        raise ConfigError(key, f"must be finite, got {made}")
-    return made
+    if isinstance(converted, float) and not math.isfinite(converted):
+        raise ConfigError(key, f"must be finite, got {converted}")
+    return converted
 
 
 def _alternatives(kind: object) -> tuple[object, ...]:
@@ -425,20 +425,20 @@ _REPLACED = {
 
 def overridden(values: Mapping[str, object], options: Mapping[str, object]) -> Values:
     """Return the values of a file with those of options, by dotted keys, in their place."""
-    made: Values = copy.deepcopy(dict(values))
+    settings: Values = copy.deepcopy(dict(values))
     for name, key in SHORTHANDS.items():
-        if isinstance(made.get(name), str):
-            made[name] = {key: made[name]}
+        if isinstance(settings.get(name), str):
+            settings[name] = {key: settings[name]}
     for key in options:
         table, _, name = _REPLACED.get(key, "").partition(".")
-        if isinstance(made.get(table), dict):
-            made[table].pop(name, None)
+        if isinstance(settings.get(table), dict):
+            settings[table].pop(name, None)
     for key, value in options.items():
-        *tables, last = key.split(".")
-        place = made
-        for table in tables:
-            if not isinstance(place.get(table), dict):
-                place[table] = {}
-            place = place[table]
-        place[last] = value
-    return made
+        *parents, last = key.split(".")
+        inner = settings
+        for parent in parents:
+            if not isinstance(inner.get(parent), dict):
+                inner[parent] = {}
+            inner = inner[parent]
+        inner[last] = value
+    return settings

@@ -69,7 +69,7 @@ class _Run(NamedTuple):
     @property
     def key(self) -> TrialKey:
         """The key of the run, with the seed as an unsigned number."""
-        key = TrialKey(*self[1:6])
+        key = TrialKey(self.case_id, self.agent, self.trial, self.seed, self.config_hash)
         return key._replace(seed=key.seed % 2**64)
 
 
@@ -265,6 +265,7 @@ class ResultStore(AbstractContextManager["ResultStore"]):
             raise StoreError(f"{self.path} is damaged: {table}.{column}: {problem}") from None
 
     def _runs(self, key: TrialKey | None = None) -> list[_Run]:
+        """Read all runs, or that of a key; StoreError if one does not fit its checksum or hash."""
         rest = "ORDER BY id" if key is None else f"WHERE {_KEY}"
         runs = self._read(list[_Run], "*", "runs", rest, *([] if key is None else _stored(key)))
         for run in runs:
@@ -276,6 +277,7 @@ class ResultStore(AbstractContextManager["ResultStore"]):
         return runs
 
     def _run_in_progress(self, key: TrialKey, config: str, version: str) -> _Run:
+        """Return the stored run of a key, or insert one without rows."""
         for run in self._runs(key):
             return run
         checksum = TrialRows(np.zeros(0, ROW)).checksum()
@@ -292,7 +294,7 @@ class ResultStore(AbstractContextManager["ResultStore"]):
         self._connection.execute(
             "UPDATE runs SET version = ?, n_decisions = ?, seconds = ?, finished_at = ?,"
             " checksum = ?, crc = ? WHERE id = ?",
-            (*run[7:-1], _crc(run[:-1]), run.id),
+            (*run[7:-1], _crc(run[:-1]), run.id),  # `_Run` has the fields from version on last
         )
 
     def _insert(self, run_id: int, rows: TrialRows) -> None:
@@ -373,7 +375,7 @@ def _inspect(path: Path) -> bool:
     if not is_there(path) or path.stat().st_size == 0:
         return True
     with open_regular(path, MOST_BYTES) as file:
-        header = file.read(20)
+        header = file.read(20)  # bytes 18 and 19 are 1 with a rollback journal
     if header[:16] != b"SQLite format 3\0":
         raise sqlite3.DatabaseError("no SQLite file")
     if header[18:] != b"\1\1":

@@ -79,12 +79,12 @@ def run_study(
     if content is None:
         return WrittenReport(outcome)
     call = describe_call(outcome, time.monotonic() - begin, content.shown)
-    named = dict(content.files) | {
+    data_by_name = dict(content.files) | {
         "results.md": content.page.to_markdown().encode(),
         "table.json": (json.dumps(content.table, indent=2, allow_nan=False) + "\n").encode(),
         "report.html": content.page.to_html(call).encode(),
     }
-    files = {out / study.file_name(name): data for name, data in named.items()}
+    files = {out / study.file_name(name): data for name, data in data_by_name.items()}
     for path, data in files.items():
         write_whole(path, data)
     return WrittenReport(outcome, content.page, tuple(files), content.table)
