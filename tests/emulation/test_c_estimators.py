@@ -120,4 +120,4 @@ def test_the_header_states_the_stack_that_an_estimator_needs(name, learning, nee
     stack = sum(int(line.split("\t")[1]) for line in frames)
     (stated,) = re.findall(r" ([\d,]+) bytes of arrays", text)
     arrays = int(stated.replace(",", ""))
-    assert arrays < stack < arrays + 640
+    assert arrays < stack < arrays + 640, "the header states at most 640 bytes beside arrays"

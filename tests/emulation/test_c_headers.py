@@ -153,10 +153,10 @@ def test_the_header_states_flash_and_ram_of_the_compiled_policy(needs, tmp_path)
         folder.mkdir()
         header = write_policy(folder, agent, floats=False)
         constants, code, stack = sizes_on_arm(folder)
-        # Tables of what nobody calls (actions, say) are not in the object.
+        # Unused tables, such as that of actions, are not in the object; padding adds bytes.
         assert header.flash_bytes - 512 < constants < header.flash_bytes + 128
-        assert 400 < code < 2048
-        assert header.ram_bytes < stack < header.ram_bytes + 256
+        assert 400 < code < 2048, "the header states 1 to 2 kB of code"
+        assert header.ram_bytes < stack < header.ram_bytes + 256, "arrays, and saved registers"
         assert f"{header.flash_bytes:,} bytes of constants" in header.text
         assert f"{header.ram_bytes:,} bytes of arrays on the stack" in header.text
 

@@ -18,7 +18,7 @@ WITHOUT_EXCEPTIONS = """
 
 int main(int argc, char**) {
   sdnn::core::error_handler() = [](const char* message) {
-    std::printf("heard: %s\\n", message);
+    std::printf("handled: %s\\n", message);
     std::exit(3);
   };
   sdnn::environments::AcrobotConfig config;
@@ -76,7 +76,7 @@ def test_a_program_without_exceptions_receives_errors_by_its_handler(compile_pro
     compiled = compile_program(WITHOUT_EXCEPTIONS, *options, *EXACT)
     assert compiled.returncode == 0, compiled.stderr
     run = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True)
-    assert run.stdout == "0\n"
+    assert run.stdout == "0\n", "one step does not end an episode"
     run = subprocess.run([tmp_path / "main", "bad"], capture_output=True, text=True, check=False)
-    assert run.returncode == 3
-    assert run.stdout.startswith("heard: integration_step must be ")
+    assert run.returncode == 3, "the exit code of the program's handler"
+    assert run.stdout.startswith("handled: integration_step must be ")

@@ -296,4 +296,5 @@ def test_a_wheel_built_from_the_source_distribution_is_complete(sdist, tmp_path)
     assert expected <= names
     assert any(re.fullmatch(r"sdnn/_core\..*(so|pyd)", name) for name in names)
     assert not any("Eigen/" in name or name.startswith("tests") for name in names)
+    # The extension takes most of it: debug symbols or data by mistake would exceed the limit.
     assert wheel.stat().st_size < 2_500_000

@@ -251,7 +251,7 @@ class BaseAgent(Advised, abc.ABC, Generic[Approximator, Learning]):
             whole("environment", environment, 0, self.n_environments - 1)
 
     def begin_episode(self, environment: int = 0) -> None:
-        """Note that an episode begins; `learn` does not, even after a terminated transition.
+        """Begin an episode; `learn` begins none, even after a terminated transition.
 
         Resets the count of greedy first steps, and learns the pending transitions.
         """

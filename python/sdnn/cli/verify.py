@@ -120,6 +120,7 @@ def _reports(source: Path | None, consent: Consent) -> Reports:
 
 
 def _show(verification: Verification, as_json: bool) -> None:
+    """Print what was repeated and what differs, as text or as JSON."""
     notes = _notes(verification)
     if as_json:
         values = {

@@ -169,7 +169,7 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
         return probabilities
 
     def _require_classes(self, classes: ArrayLike | None) -> None:
-        """Check the arguments of `partial_fit` and `learn_one` that `fit` does not have."""
+        """Raise ValueError for a class weight, which only `fit` uses, or missing first classes."""
         if self.class_weight is not None:
             raise ValueError(f"class_weight works in fit only, got {shown(self.class_weight)}")
         if classes is None and not hasattr(self, "network_"):

@@ -63,7 +63,8 @@ class LinearColumns:
     ) -> tuple[list[float], list[float]]:
         """Add the columns of features and of new categories; return their lowest, highest values.
 
-        ``codings`` are fitted; ``rows`` have the last values of all features.
+        A number has a column, a category an indicator, 0 or 1; beyond `MOST_COLUMNS` none is
+        added. ``codings`` are fitted; ``rows`` have the last values of all features.
         """
         low: list[float] = []
         high: list[float] = []
@@ -71,12 +72,12 @@ class LinearColumns:
             base = present(coding)
             if isinstance(base, Categorical):
                 columns = self.categories.setdefault(name, {})
-                new = [value for value in base.categories or () if value not in columns]
-                new = new[: MOST_COLUMNS - len(self.empty)]
-                columns |= {value: len(self.empty) + index for index, value in enumerate(new)}
-                self.empty += [0.0] * len(new)
-                low += [0.0] * len(new)
-                high += [1.0] * len(new)
+                added = [value for value in base.categories or () if value not in columns]
+                added = added[: MOST_COLUMNS - len(self.empty)]
+                columns |= {value: len(self.empty) + index for index, value in enumerate(added)}
+                self.empty += [0.0] * len(added)
+                low += [0.0] * len(added)
+                high += [1.0] * len(added)
             elif len(self.empty) < MOST_COLUMNS and name not in self.numbers:
                 values = [value for row in rows if (value := row.get(name)) is not None]
                 limits = usual_range(np.array(values or [0.0], dtype=np.float64))

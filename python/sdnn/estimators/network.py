@@ -194,6 +194,7 @@ class Network:
         None if the weights do not fit into bytes, or exceed ``memory_limit`` at two bytes each.
         """
         n_bytes = 2 * self.n_units * self.input_code.core.n_columns
+        # Another thread may have made the layer since the check: `or` looks again under the lock.
         if self._online is None and n_bytes <= memory_limit:
             with self._lock, contextlib.suppress(ValueError, MemoryError):
                 self._online = self._online or _core.OnlineLayer(self._layer)

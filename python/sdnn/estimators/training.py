@@ -238,8 +238,9 @@ def run_epochs(
     network = model.network_
     history = History(network)
     weights = scaled_up(weights)
-    quiet, n_quiet = 0, epochs_to_present_all(weights)
-    kept: deque[Network] = deque(maxlen=n_averaged_epochs - 1)
+    # Training ends after so many epochs without a correction that each sample was presented.
+    n_uncorrected, most_uncorrected = 0, epochs_to_present_all(weights)
+    earlier: deque[Network] = deque(maxlen=n_averaged_epochs - 1)
     with progress_bar(model.verbose, max_iter) as advance:
         for epoch in range(max_iter):
             order = samples_of_epoch(n_samples, weights, epoch)
@@ -252,18 +253,18 @@ def run_epochs(
                 trainer.synchronize()
                 history.scores.append(score())
                 if epoch == 0 or history.scores[-1] > history.scores[history.n_epochs - 1]:
-                    history.network, history.earlier = network.copy(), tuple(kept)
+                    history.network, history.earlier = network.copy(), tuple(earlier)
                     history.n_epochs = epoch + 1
                 elif epoch + 1 - history.n_epochs >= model.n_iter_no_change:
                     break
-            quiet = quiet + 1 if n_corrected == 0 else 0
-            if quiet == n_quiet:
+            n_uncorrected = n_uncorrected + 1 if n_corrected == 0 else 0
+            if n_uncorrected == most_uncorrected:
                 break
             is_kept = (epoch + 1) % epochs_between_averages(n_samples) == 0 and epoch + 1 < max_iter
             if n_averaged_epochs > 1 and is_kept:
                 trainer.synchronize()
-                kept.append(network.copy())
+                earlier.append(network.copy())
     trainer.synchronize()
     if score is None:
-        history.earlier = tuple(kept)
+        history.earlier = tuple(earlier)
     return history

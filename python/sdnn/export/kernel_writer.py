@@ -48,6 +48,7 @@ class KernelWriter(HeaderText):
 
     @property
     def _has_all_pairs(self) -> bool:
+        """Whether sums over inputs replace the loop over pairs: with two they would save nothing."""
         return self.kernel.has_all_pairs and len(self.inputs) > 2
 
     def about(self) -> str:
@@ -128,8 +129,8 @@ class KernelWriter(HeaderText):
 
     def ram_bytes(self) -> int:
         """Return the bytes of the arrays on the stack."""
-        n_bytes = 4 * len(self.inputs) + 8 * self.n_sums
-        if len(self.directions):
+        n_bytes = 4 * len(self.inputs) + 8 * self.n_sums  # bins, and doubles
+        if len(self.directions):  # values of features and directions, and sums of directions
             n_bytes += 8 * (self.n_features + 2 * len(self.directions))
         return rounded_up(n_bytes, 8)
 

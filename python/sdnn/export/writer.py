@@ -240,6 +240,7 @@ class Writer(ABC, Generic[Network]):
         )
 
     def _missing_remark(self) -> list[str]:
+        """Tell the header's reader what happens to an observation with a missing reading."""
         name = self.name.upper()
         if self.codes_missing:
             return [f"A reading may be {name}_MISSING: each input has a pattern for that."]

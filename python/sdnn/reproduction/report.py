@@ -166,6 +166,7 @@ class Report:
             )
 
     def _details(self) -> Iterator[Section]:
+        """Yield the folded tables of all quantities, and the sections about measures, settings."""
         folded = []
         if self.claims:
             title = "Each quantity of the claims, by these trials alone"

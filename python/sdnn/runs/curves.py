@@ -152,7 +152,11 @@ def curves_of(runs: Sequence[Run]) -> tuple[list[Curve], list[str]]:
 
 
 def _curves_of_group(group: Group) -> tuple[list[Curve], list[str]]:
-    """Return the episodes of each run, and the medians over runs of a group; and notes."""
+    """Return a group's curves, and notes about what is missing from them.
+
+    Each run has its episodes and their running median. A single run's evaluations are drawn with
+    their quartiles, those of several runs as medians at their common steps.
+    """
     rows = {run: run.rows() for run in group.runs}
     episodes, evaluated = (
         {run: pair for run, pair in series.items() if len(pair[0])}
@@ -161,9 +165,9 @@ def _curves_of_group(group: Group) -> tuple[list[Curve], list[str]]:
             for kind in _KINDS_OF_ROWS
         )
     )
-    what = "no evaluation" if evaluated else "no episode and no evaluation"
-    compared = evaluated or episodes
-    notes = [f"{run.folder}: {what} is whole yet" for run in group.runs if run not in compared]
+    missing = "no evaluation" if evaluated else "no episode and no evaluation"
+    drawn = evaluated or episodes
+    notes = [f"{run.folder}: {missing} is whole yet" for run in group.runs if run not in drawn]
     curves = [
         Curve(
             task=group.task, agent=group.agent, run=str(run.folder),

@@ -244,12 +244,12 @@ class Inspection:
                 ("epsilon now", f"{agent.epsilon:.4g}"),
                 ("alpha now", f"{agent.learning_rate:.4g}"),
             ]
-        named = {
+        titles = {
             "value_unit": "unit of values", "recent_reward": "size of recent rewards",
             "value_step": "step of values", "mean_error": "mean size of corrections",
             "n_corrections": "corrections",
         }  # fmt: skip
-        numbers += [(title, f"{report[n]:.4g}") for n, title in named.items() if report.get(n)]
+        numbers += [(title, f"{report[n]:.4g}") for n, title in titles.items() if report.get(n)]
         if report.get("n_corrections"):
             for name in ("share_changed", "share_rounded_away", "share_out_of_range"):
                 numbers.append((name.replace("_", " "), f"{report[name]:.1%}"))

@@ -130,11 +130,12 @@ def test_greedy_actions_of_a_box_are_the_mean_of_the_best_one_and_its_neighbours
     expected = []
     for dimension, actions in enumerate((np.linspace(-1.0, 1.0, 5), np.linspace(0.0, 8.0, 5))):
         p = agent.action_probabilities(observation, dimension)
-        near = slice(max(p.argmax() - 1, 0), p.argmax() + 2)
+        near = slice(max(p.argmax() - 1, 0), p.argmax() + 2)  # the best action and its neighbours
         expected.append(p[near] @ actions[near] / p[near].sum())
-        assert not np.isclose(expected[-1], actions).any()
+        assert not np.isclose(expected[-1], actions).any(), "a mean between two actions"
     action = agent.act(observation, explore=False)
     np.testing.assert_allclose(action, expected, atol=1e-4)
+    # An action between two of the agent's can be learned.
     agent.learn(Transition(observation, action, 0.0, observation, terminated=True))
 
 

@@ -119,6 +119,7 @@ def test_a_long_action_with_the_higher_reward_is_chosen_only_without_durations(a
 
 
 def test_values_are_those_of_a_semi_markov_process():
+    # The docstring of `Courier` derives the expected values of a near and of a far job.
     agent, courier = couriers(SDNNQLambda)
     agent.train(courier(True), steps=20_000, seed=1)
     np.testing.assert_allclose(agent.q_values([0.5]), [10.0, 2 + 0.9**5 * 10], rtol=0.03)

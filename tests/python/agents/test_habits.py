@@ -68,7 +68,7 @@ def test_predict_accepts_batches_of_dict_and_tuple_observations(kind):
     space.seed(1)
     several = [space.sample() for _ in range(4)]
     for observation in several:
-        agent.learn(Transition(observation, 7, 1.0, observation, False))  # 7 becomes the best
+        agent.learn(Transition(observation, 7, 1.0, observation, False))  # the only reward
     batch = gym.vector.utils.create_empty_array(space, 4)
     batch = gym.vector.utils.concatenate(space, several, batch)
     assert agent.predict(batch)[0].tolist() == [7] * 4

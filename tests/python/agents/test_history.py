@@ -135,11 +135,11 @@ def test_a_loaded_agent_with_a_history_acts_and_learns_as_the_saved_one(history,
     agent = SDNNQLambda(positions(), seed=1, history=history)
     agent.train(positions(), steps=STEPS_BEYOND_WARM_UP, seed=1)
     agent.save(tmp_path / "agent.safetensors")
-    same = load_agent(tmp_path / "agent.safetensors")
-    assert same.history == history
-    for resumed in (agent, same):
+    loaded = load_agent(tmp_path / "agent.safetensors")
+    assert loaded.history == history
+    for resumed in (agent, loaded):
         resumed.train(positions(), steps=20, seed=2)
-    assert states_equal(agent, same)
+    assert states_equal(agent, loaded)
 
 
 def test_evaluations_do_not_change_the_history_of_the_current_episode():

@@ -115,6 +115,7 @@ def test_symbols_of_a_dictionary_that_decide_are_found():
     )  # fmt: skip
     inputs = inputs_of(agent)
     over_gear = map_of(Reader(agent), meet_states(agent, env), [first.input], inputs)
+    # Symbols are counted from 0, gears from 2, so that even symbols are even gears.
     np.testing.assert_array_equal(over_gear.axes[0], [0, 1, 2, 3])
     np.testing.assert_array_equal(over_gear.actions[:, 0], [0, 1, 0, 1])
 

@@ -58,10 +58,11 @@ class Square(gym.Env):
 def test_noise_is_left_out_however_many_inputs_it_has():
     for kind in ("numbers", "bits", "one-hot"):
         agent = SDNNQLambda(env := WithNoise(100, kind), seed=1)
-        agent.train(env, steps=1001, seed=1)
-        kept = [variable for _, variables in agent.inputs for variable in variables]
-        assert kept[:4] == [0, 1, 2, 3]
-        assert len(kept) <= (5 if kind == "numbers" else 4)
+        agent.train(env, steps=1001, seed=1)  # inputs are chosen after 1,000
+        chosen = [variable for _, variables in agent.inputs for variable in variables]
+        assert chosen[:4] == [0, 1, 2, 3], "the variables of CartPole"
+        # One of a hundred numbers may seem relevant by chance.
+        assert len(chosen) <= (5 if kind == "numbers" else 4)
 
 
 def test_binary_inputs_are_kept_as_a_whole_and_learned():
@@ -74,13 +75,14 @@ def test_binary_inputs_are_kept_as_a_whole_and_learned():
 
 
 def max_pairs(env, **options):
+    """Return the limit of pairs that a new agent chooses at the end of its warm-up."""
     agent = SDNNQLambda(env, seed=1, **options)
-    agent.train(env, steps=1001, seed=1)
+    agent.train(env, steps=1001, seed=1)  # the warm-up takes 1,000
     return agent.readout.config.max_pairs
 
 
 def test_more_than_32_inputs_form_1024_pairs_also_after_loading(tmp_path):
-    all_pairs = 0
+    all_pairs = 0  # stands for no limit
     env = gym.wrappers.TimeLimit(Square(6, one_hot=True), 100)  # of 36 inputs
     assert max_pairs(env) == 1024
     assert max_pairs(env, inputs="all") == all_pairs

@@ -100,7 +100,9 @@ GEAR = gym.spaces.Dict(
 
 def test_each_discrete_part_is_one_symbol_input_where_symbols_are_coded():
     agent = SDNNQLearning(GEAR, BUTTONS, approximator=SMALL)
-    assert agent.inputs == [  # Gymnasium sorts the names of a Dict
+    # A variable has its number, a symbol the first of its flattened variables and how many they
+    # are. Gymnasium sorts the names of a Dict.
+    assert agent.inputs == [
         ("symbol", [0, 3]),
         ("variable", [3]),
         ("variable", [4]),
@@ -210,8 +212,8 @@ def test_listed_inputs_are_kept_although_irrelevant():
     agent = sdnn_agent(env.observation_space, inputs=[9, 6])
     agent.train(env, steps=1001, seed=1)
     kept = [variables[0] for _, variables in agent.inputs]
-    assert {0, 1, 2, 3, 6, 9} <= set(kept)
-    assert len(kept) <= 7
+    assert {0, 1, 2, 3, 6, 9} <= set(kept), "the variables of CartPole, and the listed ones"
+    assert len(kept) <= 7, "at most one irrelevant variable more"
 
 
 def test_listing_a_variable_keeps_its_whole_symbol_or_angle():

@@ -315,15 +315,18 @@ def test_a_network_without_linear_readout_keeps_the_inputs_of_its_warm_up():
 
 
 def test_an_outlier_reward_is_not_learned_and_keeps_the_reported_unit():
-    agent, same = (SDNNQLambda(gym.spaces.Discrete(2), gym.spaces.Discrete(2)) for _ in range(2))
+    agent, without_outlier = (
+        SDNNQLambda(gym.spaces.Discrete(2), gym.spaces.Discrete(2)) for _ in range(2)
+    )
     assert agent.learning_report()["value_unit"] is None
     for step in range(3000):
         if step == 1000:
             with pytest.warns(UserWarning, match=r"reward -1e\+12 of transition 1001"):
                 agent.learn(Transition(0, 0, -1e12, 0, terminated=True))
-        for learner in (agent, same):
+        for learner in (agent, without_outlier):
             learner.learn(Transition(0, 1, 3.0, 0, terminated=True))
-    assert agent.q_values(0).tolist() == same.q_values(0).tolist()
+    assert agent.q_values(0).tolist() == without_outlier.q_values(0).tolist()
     report = agent.learning_report()
     assert report["recent_reward"] == 2.0  # the power of two below rewards of 3
-    assert report["value_unit"] == same.learning_report()["value_unit"] < 1e-5
+    # A unit for the outlier would be larger than 1e-5 by far.
+    assert report["value_unit"] == without_outlier.learning_report()["value_unit"] < 1e-5

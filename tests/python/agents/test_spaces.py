@@ -90,7 +90,7 @@ def test_messages_about_large_spaces_are_single_lines():
 
 def test_other_bounds_are_named_and_can_be_accepted_by_setting_the_space(tmp_path):
     agent = RBFQLearning(Tuple((Discrete(2), Box(-1, 1, (9,)))), Discrete(2))
-    high = np.array([1, 57.3] + [1] * 7, np.float32)
+    high = np.array([1, 57.3] + [1] * 7, np.float32)  # variable 1 in degrees, not radians
     env = Spaces(Tuple((Discrete(2), Box(-high, high))), Discrete(2))
     with pytest.raises(ValueError, match=r"variable 1 of \[1\] \(-57.3 to 57.3 instead of -1"):
         require_same_kind(agent, env)

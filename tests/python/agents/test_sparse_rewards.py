@@ -33,6 +33,7 @@ def longest_run(actions):
 
 
 def test_random_actions_are_repeated_while_all_rewards_were_zero():
+    # Of 1,000 actions drawn of four, a run of 15 has a probability of 1000 / 4^14.
     no_rewards = [0.0] * 1000
     assert longest_run(act_and_learn(new_agent(), no_rewards)) >= 40
     # Two runs of the same action may meet.
@@ -72,7 +73,7 @@ def test_ends_of_episodes_are_counted_only_after_the_search():
     assert int(agent.state()["agent.n_ended"]) == 1
 
 
-@pytest.mark.parametrize("n_steps", [30, 80])
+@pytest.mark.parametrize("n_steps", [30, 80])  # before and after the first reward, at step 61
 def test_a_search_resumes_exactly(n_steps, tmp_path):
     rewards = [0.0] * 60 + [1.0] + [0.0] * 200
     whole, part = new_agent(), new_agent()

@@ -135,16 +135,12 @@ def test_environments_with_other_spaces_are_refused():
         refuses("evaluation_env", agent.train, Corridor(), steps=10, **evaluations)
 
 
-def test_the_environment_of_a_training_cannot_be_that_of_its_evaluations():
-    env = Corridor()
-    refuses(
-        "evaluation_env",
-        corridor_agent().train,
-        env,
-        steps=10,
-        evaluate_every=5,
-        evaluation_env=env,
-    )
+def test_evaluations_refuse_vectors_and_the_environment_of_the_training():
+    agent, env, several = corridor_agent(), Corridor(), gym.vector.SyncVectorEnv([Corridor] * 2)
+    refuses("env", evaluate, agent, several, error=TypeError)
+    for wrong, error in ((several, TypeError), (env, ValueError)):
+        evaluations = {"evaluate_every": 5, "evaluation_env": wrong}
+        refuses("evaluation_env", agent.train, env, steps=10, error=error, **evaluations)
 
 
 def test_an_evaluation_warns_of_an_episode_of_more_than_100_000_steps():
@@ -177,7 +173,7 @@ def test_rewards_may_be_scalars_of_any_numeric_type(reward):
         def step(self, action):
             return super().step(action)[0], reward, False, self._steps == 8, {}
 
-    # Eight steps with a reward of 1.
+    # Episodes have eight steps, each with a reward of 1.
     assert corridor_agent().train(ConstantReward(), episodes=2).returns.tolist() == [8.0, 8.0]
     assert evaluate(corridor_agent(), ConstantReward(), 1).mean_return == 8.0
 
@@ -465,20 +461,6 @@ def test_resuming_first_repeats_a_failed_evaluation(tmp_path):
     assert rows_without_times(rows) == rows_without_times(tmp_path / "whole")
 
 
-def test_evaluation_refuses_vector_environments():
-    several = gym.vector.SyncVectorEnv([Corridor] * 2)
-    refuses("env", evaluate, corridor_agent(), several, error=TypeError)
-    refuses(
-        "evaluation_env",
-        corridor_agent().train,
-        Corridor(),
-        steps=9,
-        evaluate_every=3,
-        evaluation_env=several,
-        error=TypeError,
-    )
-
-
 def test_further_trainings_of_an_agent_and_its_copies_continue_the_episode_seeds(tmp_path):
     env, agent = Corridor(), corridor_agent()
     agent.train(env, episodes=3)
@@ -517,13 +499,13 @@ def test_sdnn_q_learning_learns_the_shortest_way_through_a_corridor():
 
 
 def test_evaluations_report_mean_returns_and_do_not_change_what_is_learned():
-    plain = Training(corridor_agent(), Corridor(), steps=300)
-    tested = Training(
+    unevaluated = Training(corridor_agent(), Corridor(), steps=300)
+    evaluated = Training(
         corridor_agent(), Corridor(), steps=300, evaluate_every=50, evaluation_env=Corridor()
     )
-    plain.run()
-    result = tested.run()
-    expected, state = plain.agent.state(), tested.agent.state()
+    unevaluated.run()
+    result = evaluated.run()
+    expected, state = unevaluated.agent.state(), evaluated.agent.state()
     # Only the generator that breaks ties in evaluations has drawn numbers.
     differ = {name for name in state if not np.array_equal(state[name], expected[name])}
     assert differ <= {"agent.policy.evaluation_ties.words"}
@@ -612,7 +594,7 @@ def test_resuming_without_repeating_abandons_the_unfinished_episode(tmp_path):
     assert rows[-1]["step"] == learned + unfinished, "the steps of what was left count"
 
 
-def test_repeat_episodes_makes_no_difference_between_two_episodes(tmp_path):
+def test_a_training_stopped_between_episodes_resumes_the_same_with_and_without_repeating(tmp_path):
     class StopBetween(Callback):
         def on_row(self, training, row):
             if row["episode"] == 5:
@@ -621,11 +603,12 @@ def test_repeat_episodes_makes_no_difference_between_two_episodes(tmp_path):
     training = Training(corridor_agent(), Corridor(), steps=200, callbacks=[StopBetween()])
     training.run()
     training.save(tmp_path / "t")
-    repeating, abandoning = (
-        Training.load(tmp_path / "t", Corridor(), repeat_episodes=does) for does in (True, False)
-    )
-    assert repeating.run().n_steps == abandoning.run().n_steps == 200
-    assert states_equal(repeating.agent, abandoning.agent)
+    resumed = [
+        Training.load(tmp_path / "t", Corridor(), repeat_episodes=repeats)
+        for repeats in (True, False)
+    ]
+    assert [training.run().n_steps for training in resumed] == [200, 200]
+    assert states_equal(*(training.agent for training in resumed))
 
 
 def test_n_step_transitions_of_an_abandoned_episode_are_learned_on_resuming(tmp_path):
@@ -770,14 +753,8 @@ def test_reset_options_depend_on_the_number_of_the_episode():
 
 
 def test_reset_options_are_refused_with_a_vector():
-    refuses(
-        "reset_options",
-        Training,
-        corridor_agent(),
-        gym.vector.SyncVectorEnv([Corridor] * 2),
-        steps=9,
-        reset_options=dict,
-    )
+    envs = gym.vector.SyncVectorEnv([Corridor] * 2)
+    refuses("reset_options", Training, corridor_agent(), envs, steps=9, reset_options=dict)
 
 
 def test_without_limit_bootstraps_a_truncation_is_learned_as_a_termination():

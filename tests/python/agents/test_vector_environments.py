@@ -221,9 +221,9 @@ def test_batched_acrobots_have_the_bits_of_single_ones_and_resume_exactly(tmp_pa
         return Training(agent(), acrobots(), steps=400, callbacks=callbacks)
 
     whole = check_exact_resume(begun, acrobots, tmp_path / "t", (100, 302, 355))
-    slow = Training(agent(), acrobots("sync"), steps=400)
-    slow.run()
-    assert states_equal(whole.agent, slow.agent)
+    of_singles = Training(agent(), acrobots("sync"), steps=400)
+    of_singles.run()
+    assert states_equal(whole.agent, of_singles.agent)
 
 
 def test_steps_callbacks_and_evaluations_count_transitions(tmp_path):

@@ -60,6 +60,7 @@ def agent_for(env):
 
 
 @pytest.mark.parametrize("wrappers", WRAPPERS.values(), ids=WRAPPERS)
+# Episodes have 60 steps: at the end of the first, and three times within the second.
 @pytest.mark.parametrize("cut", [60, 61, 95, 119])
 def test_a_training_with_normalizing_wrappers_resumes_exactly(wrappers, cut, tmp_path):
     options = {"steps": 200, "evaluate_every": 50, "evaluation_episodes": 1}

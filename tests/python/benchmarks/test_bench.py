@@ -97,7 +97,7 @@ def test_a_quick_run_measures_the_networks_and_trials_of_the_paper(quick, with_y
     assert sizes == [(4, 2400), (6, 6000)]
     levels = list(available_instruction_sets())
     for network in with_yardsticks["networks"]:
-        assert (network["n_hidden_units"], network["n_actions"]) == (900, 601)
+        assert (network["n_hidden_units"], network["n_actions"]) == (900, 601), "those of the paper"
         for name in ("values", "ratio_to_dense"):
             assert list(network[name]) == levels
         assert set(network["dense"]) == {"numpy", "core"}

@@ -242,7 +242,7 @@ def test_sensor_wrappers_have_the_stated_noise_and_correlation(scripts):
     for seed in range(300):
         observations.append(env.reset(seed=seed)[0])
         observations += [env.step(i % 2)[0] for i in range(8)]
-    observations = np.array(observations).reshape(300, 9, 15)
+    observations = np.array(observations).reshape(300, 1 + 8, 4 * 3 + 3)
     # Noise of a copy in the units of a variable: a tenth of its range, 4.8 for the position.
     apart = (observations[:, :, 0] - observations[:, :, 4]) / np.sqrt(2)
     assert apart.std() == pytest.approx(0.48, rel=0.05)
@@ -319,6 +319,7 @@ def test_tile_codings_of_pairs_hashes_and_tables_have_their_indices(scripts):
     assert indices.shape == (50, 16)
     assert indices.min() >= 0
     assert indices.max() < 1000
+    # 50 * 16 random numbers below 1,000 have 1000 * (1 - e^-0.8) = 551 different values.
     assert len(np.unique(indices)) > 400
     assert hashed(points[0]).tolist() == hashed(points[0] + 1e-6).tolist()
     assert tiles.Table(5)(3).tolist() == [3]
@@ -373,12 +374,13 @@ def test_stream_q_follows_the_gradient_of_its_value(scripts):
     network.parameters[:] = before
     largest = np.argsort(-np.abs(moved))[:20]
     slopes = []
-    for place in largest:
-        ends = []
+    for parameter in largest:
+        values = []
         for change in (1e-3, -1e-3):
-            network.parameters[place] = before[place] + change
-            ends.append(float(network.outputs(state)[agent_action]))
-        network.parameters[place] = before[place]
-        slopes.append((ends[0] - ends[1]) / 2e-3)
+            network.parameters[parameter] = before[parameter] + change
+            values.append(float(network.outputs(state)[agent_action]))
+        network.parameters[parameter] = before[parameter]
+        slopes.append((values[0] - values[1]) / 2e-3)
+    # Each parameter moves in proportion to its slope, up to the error of finite differences.
     ratios = moved[largest] / np.array(slopes)
     assert np.allclose(ratios, np.median(ratios), rtol=0.05)

@@ -23,6 +23,7 @@ def test_inner_products_of_long_codes_approach_the_kernel(coding, pairs):
     # A pair gives half its units, a plain pattern all of them.
     n_active = n_units / 2 * sum(2 if mu == nu else 1 for mu, nu in model.pairs_)
     limit = kernel.AnalyticKernel(model.codings_, pairs=model.pairs_, n_units=n_units)(X)
+    # Means over 20,000 random units have a standard deviation of about 0.007.
     assert np.abs(code @ code.T / n_active - limit).max() < 0.03
     np.testing.assert_allclose(np.diag(limit), 1)
     np.testing.assert_allclose(limit, limit.T)

@@ -67,7 +67,7 @@ def test_files_can_be_read_by_safetensors(tmp_path):
     with safe_open(tmp_path / "file", framework="numpy") as file:
         about = json.loads(file.metadata()["sdnn"])
         np.testing.assert_array_equal(file.get_tensor("turned"), ARRAYS["turned"])
-    assert len(about.pop("checksum")) == 8
+    assert len(about.pop("checksum")) == 8  # 32 bits as hexadecimal digits
     assert about == {
         "kind": "estimator",
         "format": files.FORMAT,

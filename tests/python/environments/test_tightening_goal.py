@@ -47,7 +47,7 @@ def test_a_reset_without_an_episode_keeps_the_last_one():
     env = TighteningGoal(gym.make(ID))
     assert env.episode == 1
     assert tolerance(env) == GoalSchedule()(1)
-    assert tolerance(env, options={"episode": 300}) == 0.25
+    assert tolerance(env, options={"episode": 300}) == 0.25  # 1 / (1 + 300 / 100)
     for reset in ({}, {"seed": 3}, {"options": {}}):
         assert tolerance(env, **reset) == 0.25
         assert env.episode == 300
@@ -74,7 +74,7 @@ def test_the_episode_reaches_the_goal_through_other_wrappers():
     env = NoisySensors(TighteningGoal(RedundantSensors(gym.make(ID, config=AcrobotConfig()))))
     assert env.reset(options={"episode": 100})[0].shape == (6,)
     env.set_wrapper_attr("episode", 300)
-    assert tolerance(env) == 0.25
+    assert tolerance(env) == 0.25  # 1 / (1 + 300 / 100)
     assert env.get_wrapper_attr("goal_tolerance") == 0.25
 
 

@@ -87,9 +87,11 @@ def test_columns_are_numbers_and_indicators_of_categories_and_grow_with_new_ones
     rows = [{"a": 2.0, "w": "u"}, {"a": None, "w": "v"}, {"a": 4.0}]
     codings = {"a": RandomInverse(), "w": WithMissing(base=Symbolic(categories=("u", "v")))}
     columns = LinearColumns()
+    # Lowest and highest values of the number a and of the indicators of u and v.
     assert columns.add(codings, rows) == ([2.0, 0.0, 0.0], [4.0, 1.0, 1.0])
     np.testing.assert_array_equal(columns.row(rows[0]), [2.0, 1.0, 0.0])
     np.testing.assert_array_equal(columns.row({"w": "other", "b": 1.0}), [np.nan, 0.0, 0.0])
+    # New are the indicator of x and the number b, whose only value is 7.
     more = {"w": Symbolic(categories=("u", "v", "x")), "a": RandomInverse(), "b": RandomInverse()}
     assert columns.add(more, [{"b": 7.0}]) == ([0.0, 7.0], [1.0, 7.0])
     np.testing.assert_array_equal(columns.row({"w": "x", "b": 1.0}), [np.nan, 0, 0, 1, 1])
@@ -113,8 +115,9 @@ def test_a_linear_target_is_left_to_linear_regression(river):
     rows = points(600, 8)
     targets = [x["x0"] + 2 * x["x1"] - x["x2"] + 0.5 * x["x7"] for x in rows]
     model, alone = regressor(river), regressor(river, "network")
-    errors = {made: errors_of(made, rows, targets)[200:] for made in (model, alone)}
-    assert np.square(errors[model]).mean() < 0.01 * np.square(errors[alone]).mean()
+    # The first 200 samples are left out, in which all experts still learn.
+    squares = [np.square(errors_of(m, rows, targets)[200:]).mean() for m in (model, alone)]
+    assert squares[0] < 0.01 * squares[1]
     assert model.weights_["linear"] > 0.99
     assert alone.weights_ == {"network": 1.0}
     assert sum(model.weights_.values()) == pytest.approx(1.0)

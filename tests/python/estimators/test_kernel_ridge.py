@@ -107,9 +107,9 @@ def test_low_rank_fits_are_close_to_exact_ones():
     samples = np.random.RandomState(0).uniform(0, 1, (3000, 2))
     y = np.sin(6 * samples[:, 0]) * samples[:, 1]
     exact = SDNNKernelRidge(max_components=3000, alpha=0.1, degree=2).fit(samples[:1000], y[:1000])
-    same = clone(exact).set_params(max_components=999, random_state=0)
-    same.fit(samples[:1000], y[:1000])
-    np.testing.assert_allclose(same.predict(samples), exact.predict(samples), atol=0.01)
+    low_rank = clone(exact).set_params(max_components=999, random_state=0)
+    low_rank.fit(samples[:1000], y[:1000])  # with one component fewer than samples
+    np.testing.assert_allclose(low_rank.predict(samples), exact.predict(samples), atol=0.01)
 
 
 def test_low_rank_fits_keep_to_the_documented_memory():

@@ -66,13 +66,14 @@ def test_a_part_of_many_samples_selects_the_features(make):
     y = Y if make is SDNNRegressor else np.median(Y) < Y
     options = {**OPTIONS, "n_pattern_units": None}
     model = make(**options).fit(samples, y)
+    # The useful features are the last; halving 12 features leaves 6 of them, with 30 pairs.
     assert {9, 10} <= {feature for pair in model.pairs_ for feature in pair}
-    assert len(model.pairs_) <= 30
+    assert len(model.pairs_) <= 6 * 5
     every = make(**options, pairs="all").fit(samples, y)
-    assert len(every.pairs_) == 132
+    assert len(every.pairs_) == 12 * 11
     assert model.score(samples, y) > every.score(samples, y) - 0.02
     few = make(**options).fit(samples[:1000], y[:1000])
-    assert len(few.pairs_) == 132
+    assert len(few.pairs_) == 12 * 11, "few samples select no features"
 
 
 @pytest.mark.usefixtures("few_are_many")

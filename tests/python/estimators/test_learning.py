@@ -168,7 +168,7 @@ def test_a_target_of_one_column_is_learned_like_a_vector_and_keeps_its_shape():
 
 def test_predictions_are_multiples_of_a_step_within_the_output_range():
     model = SDNNRegressor(**REGRESSOR, max_iter=20, n_averaged_epochs=1).fit(X, Y)
-    counts = (model.predict(X) + 1.5) / (3 / 60)
+    counts = (model.predict(X) + 1.5) / (3 / 60)  # of 60 units, over the range from -1.5 to 1.5
     np.testing.assert_allclose(counts, np.round(counts), atol=1e-9)
 
 
@@ -324,7 +324,8 @@ def test_sample_and_class_weights_are_multiplied():
     options = {**SETTINGS, "max_iter": 4}
     labels = (Y > 0).astype(int)
     both = SDNNClassifier(**options, class_weight={0: 2, 1: 1}).fit(X, labels, np.full(len(Y), 0.5))
-    same(both, SDNNClassifier(**options).fit(X, labels, np.where(labels == 0, 1.0, 0.5)))
+    products = np.where(labels == 0, 2 * 0.5, 1 * 0.5)
+    same(both, SDNNClassifier(**options).fit(X, labels, products))
 
 
 def test_sample_weights_apply_to_early_stopping_and_selection_of_pairs():

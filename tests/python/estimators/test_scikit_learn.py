@@ -232,15 +232,16 @@ def test_one_hundred_features_have_500_pairs_within_16_000_columns(estimator):
     table = RANDOM.uniform(size=(20, 100))
     options = {"n_pattern_units": None, "max_iter": 1}
     estimator.set_params(**options).fit(table, targets_of(estimator)[:20])
-    assert estimator.weights_.shape[1] == 16_000
-    counts = np.array(estimator.pairs_).T
-    np.testing.assert_array_equal(np.bincount(counts[0]), 5)
-    np.testing.assert_array_equal(np.bincount(counts[1]), 5)
+    assert estimator.weights_.shape[1] == 500 * 32  # pairs, and the units of each pattern
+    modified, modifiers = np.array(estimator.pairs_).T
+    # 500 pairs of 100 features: each is modified by five others, and modifies five.
+    np.testing.assert_array_equal(np.bincount(modified), 5)
+    np.testing.assert_array_equal(np.bincount(modifiers), 5)
     assert len(set(estimator.pairs_)) == 500
     again = clone(estimator).fit(table, targets_of(estimator)[:20])
     assert again.pairs_ == estimator.pairs_
     narrow = clone(estimator).fit(table[:, :22], targets_of(estimator)[:20])
-    assert len(narrow.pairs_) == 22 * 21
+    assert len(narrow.pairs_) == 22 * 21, "all ordered pairs, since they are fewer than 500"
 
 
 def test_a_coding_with_few_bins_warns(estimator):

@@ -272,7 +272,8 @@ def test_hidden_units_outside_all_windows_are_not_exported():
     agent = discrete_agent()
     header = c_header(agent, "policy")
     assert "40 hidden units in use" in header.text
-    assert header.weight_bytes == 40 * 4 * 3 * 24
+    # A byte for each hidden unit and pattern unit of each ordered pair of four inputs.
+    assert header.weight_bytes == 40 * (4 * 3) * SMALL.n_pattern_units
 
 
 def test_weights_beyond_a_byte_take_two_bytes():
@@ -292,7 +293,7 @@ def test_acting_does_not_change_the_header():
 
 
 def test_fraction_bits_are_reduced_until_numbers_fit_32_bits():
-    # 1e5 needs 17 bits and a sign, 40000 needs 16.
+    # 1e5 needs 17 bits and a sign, so that 14 of 32 are left; 40000 needs 16, which leaves 15.
     wide = SDNNQLearning(box(1e5, 1.0), Discrete(2), approximator=SMALL)
     assert c_header(wide, "policy").fraction_bits == 14
     assert c_header(wide, "policy", fraction_bits=3).fraction_bits == 3

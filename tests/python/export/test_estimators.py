@@ -182,7 +182,7 @@ def test_names_of_columns_neither_begin_nor_end_a_comment(target, tmp_path):
     export_estimator_header(model, tmp_path / "model.h")
     text = (tmp_path / "model.h").read_text()
     assert [f"x[{i}], " in text for i in range(len(names))] == [True] * len(names)
-    assert "gr\\xf6\\xdfe" in text
+    assert "gr\\xf6\\xdfe" in text  # letters beyond ASCII are escaped
     run(*compiled(tmp_path, '#include "model.h"\nint main(void) { return 0; }', target))
 
 
@@ -198,10 +198,13 @@ def test_small_settings_fit_a_small_processor(n_inputs, groups):
         model = SDNNRegressor(**settings).fit(X, y)
     assert {index for pair in model.pairs_ for index in pair} == set(range(n_inputs))
     greedy = estimator_header(model, "model", flash_bytes=2**17)
+    # Of 128 kB of flash and 64 kB of RAM, a prediction takes 4 kB of RAM, learning all of it, with
+    # the arrays on the stack and the 640 bytes that the header states for all else there.
     assert greedy.ram_bytes < 2**12
     learner = estimator_header(model, "model", learning=True)
     (stack_bytes,) = re.findall(r" ([\d,]+) bytes of arrays", learner.text)
     assert learner.ram_bytes + int(stack_bytes.replace(",", "")) + 640 < 2**16
+    # A byte of constants has at most 3.5 characters, and code and comments some 30,000.
     assert len(greedy.text) < 3.5 * greedy.flash_bytes + 30_000
 
 
@@ -271,10 +274,13 @@ def test_few_weights_beyond_a_byte_take_little_flash():
     assert is_wide[:4].mean() > 0.5
     assert 0 < is_wide[4:].sum() < 9
     header = estimator_header(model, "model")
+    n_networks = 1 + len(model._earlier)
     # Words of four units: three rows of bytes a network, and a row of second bytes.
-    n_words = model.weights_.shape[1] * (3 * len(model._earlier) + 3 + 1)
-    structs = 20 * (1 + len(model._earlier)) + 8 * int(is_wide[4:].sum())
-    assert header.weight_bytes == 4 * n_words + (1 + len(model._earlier)) * (48 + 3) + structs
+    n_words = model.weights_.shape[1] * (3 * n_networks + 1)
+    # A network has a struct of 20 bytes, 12 thresholds of four bytes, and the numbers of bytes of
+    # three groups of units; a wide weight has a struct of 8 bytes.
+    bytes_of_networks = n_networks * (20 + 12 * 4 + 3)
+    assert header.weight_bytes == 4 * n_words + bytes_of_networks + 8 * int(is_wide[4:].sum())
 
 
 def test_a_folder_is_no_path_of_a_header(tmp_path):

@@ -175,7 +175,7 @@ def test_images_with_extreme_numbers_are_refused_or_saved_again(make, target, tm
         image[-4:] = zlib.crc32(image[:-4]).to_bytes(4, "little")
         images.append(bytes(image))
     n_loaded = int(run(hostile, input=b"".join(images)))
-    assert 40 < n_loaded < 180
+    assert 40 < n_loaded < 180, "of 200 images some have no impossible number, and many have one"
 
 
 def test_weights_that_leave_their_range_are_halved(target, tmp_path):
@@ -202,7 +202,7 @@ def test_weights_that_leave_their_range_are_halved(target, tmp_path):
     actions, image = run_program(command, save_image(agent), lines, 1)
     assert actions == run_agent(agent, lines, header.fraction_bits)
     assert image == save_image(agent)
-    assert agent._state_of("agent")["action_value.weights"].max() == 2**22
+    assert agent._state_of("agent")["action_value.weights"].max() == 2**22  # 2^23 - 1, halved
     load_image(agent, image)
 
 

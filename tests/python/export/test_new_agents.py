@@ -30,7 +30,7 @@ def test_a_new_linear_agent_is_the_largest_that_fits_the_memory(kind, ram_bytes,
     agent = new_agent(SPACE, actions, ram_bytes=ram_bytes, **settings)
     n_units = agent.approximator.n_pattern_units
     assert c_header(agent, "agent", learning=True).ram_bytes <= ram_bytes
-    larger = LinearSDNNConfig(n_pattern_units=n_units + 16)
+    larger = LinearSDNNConfig(n_pattern_units=n_units + 16)  # the next candidate; 768 is the last
     header = c_header(
         new_agent(SPACE, actions, approximator=larger, **settings), "a", learning=True
     )
@@ -42,6 +42,7 @@ def test_a_new_network_is_the_largest_that_fits_the_memory(ram_bytes, n_hidden):
     agent = new_agent(SPACE, TWO, kind="sdnn-c", ram_bytes=ram_bytes, seed=3)
     sizes = agent.approximator
     assert (sizes.n_hidden_units, sizes.n_active_units) == (n_hidden, n_hidden // 3)
+    # Patterns of the preset `small` have 40 units; hidden units are added only to full patterns.
     assert sizes.n_pattern_units == 40 if n_hidden > 75 else 15 <= sizes.n_pattern_units < 40
     assert c_header(agent, "agent", learning=True).ram_bytes <= ram_bytes
 

@@ -112,6 +112,7 @@ def test_a_load_that_fails_leaves_the_agent_or_begins_a_new_one(make, target, tm
 
 @pytest.mark.parametrize("make", [states, sarsa, network, small_steps, actor_vector])
 def test_a_cut_of_the_power_leaves_the_old_or_the_new_state(make, target, tmp_path):
+    # Six stores, each cut off after every 61st byte.
     n_cuts, *faults = cut_power(make, tmp_path, target, 6, 61, *SANITIZED)
     assert n_cuts > 60
     assert faults == [0, 0, 0, 0]

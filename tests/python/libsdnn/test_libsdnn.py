@@ -111,6 +111,7 @@ def test_values_have_the_bins_of_libsdnn(parameter_file):
         "[NUMERICAL(RANDOM_INVERSE(10,5)), SYMBOLIC(RANDOM_INVERSE(4,5))]",
     )
     parameters = libsdnn.read_parameter_file(parameter_file(symbols))
+    # Numbers from 0 to 1 have ten bins, symbols are their bins; both are clipped.
     values = [(0.0, 0), (0.0999, 1), (0.1, 3), (1.0, 4), (-3.0, -2), (2.0, 9)]
     expected = [(0, 0), (0, 1), (1, 3), (9, 3), (0, 0), (9, 3)]
     assert parameters.bins(values).tolist() == [list(pair) for pair in expected]

@@ -241,6 +241,7 @@ def test_reports_and_json_of_a_study_show_the_verdicts_of_claims(claimed):
     assert overview.header == ("variant", "claim 3", "claim 4", "claim 5", "claim 6", "claim 7")
     assert overview.rows[1] == ("new", "-", "-", "does not hold", "does not hold", "holds")
     page = page_of(claimed).to_html("")
+    # Claims 5 and 6 of `new` and 4 of `fuzzy`; then 5 to 7 of `old`, 7 of `new`, 3 of `fuzzy`.
     assert page.count('class="verdict bad">does not hold</td>') >= 3
     assert page.count('class="verdict good">holds</td>') >= 5
     checks = next(t for t in page_of(claimed).tables if t.title == "Each quantity of the claims")

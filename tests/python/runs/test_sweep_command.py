@@ -41,7 +41,8 @@ def test_a_sweep_writes_its_files_and_resumes(invoke, tmp_path):
     names = sorted(p.name for p in (tmp_path / "out").iterdir())
     assert names == sorted([*(f"mine-{name}" for name in [*FILES, "trials.csv"]), "results.sqlite"])
     # Two trials of two cases with the base and the discount 0.8; the discount 0.9 is the base's.
-    assert re.match(r"8 of 8 .* out \(8 .* 7 ", result.stdout.splitlines()[-1])  # 7 files
+    # Trials in the file, planned, run now; and written files.
+    assert re.match(r"8 of 8 .* out \(8 .* 7 ", result.stdout.splitlines()[-1])
     assert "not judged" in result.stdout
     again = invoke("sweep", "mine.toml", "--out", "out")
     assert re.search(r"\b8 of 8 .* out \(0 ", again.stdout)

@@ -136,9 +136,9 @@ def test_missing_rows_and_wrong_counts_of_decisions_are_found(tmp_path, real_rec
     shorter = replace(record, rows=TrialRows(record.rows.table[:-1]))
     problem = only_difference(verify_folder(stored(tmp_path / "shorter", [shorter]))).problem
     assert f"{len(record.rows.table)} rows" in problem, "of the trial that is run here"
-    more = replace(record, n_decisions=record.n_decisions + 1)
-    problem = only_difference(verify_folder(stored(tmp_path / "more", [more]))).problem
-    assert f"{more.n_decisions}" in problem
+    miscounted = replace(record, n_decisions=record.n_decisions + 1)
+    problem = only_difference(verify_folder(stored(tmp_path / "more", [miscounted]))).problem
+    assert f"{miscounted.n_decisions}" in problem
 
 
 def test_a_changed_setting_gives_other_rows(tmp_path, real_records):
