@@ -51,4 +51,4 @@ def test_every_class_of_the_core_has_valid_arguments_in_the_matrix():
     classes = {cls.__name__ for cls in core_cells.CLASSES}
     assert classes - configs <= set(core_cells.GOOD)
     for name in core_cells.GOOD:
-        core_cells.made(name)
+        core_cells.valid_object(name)

@@ -91,6 +91,7 @@ def reader_of(dataset: Any) -> Callable[[], Iterator[Logged]]:
 
 
 def _json_lines(path: Path) -> Iterator[Logged]:
+    """Yield the transitions of a JSON Lines file; errors name the line."""
     for number, line in _numbered_lines(path):
         try:
             values = json.loads(line)
@@ -147,6 +148,7 @@ def _with_next_observations(
 
 
 def _parse_cell(text: str) -> Any:
+    """Return the bool or the number that a cell of a CSV file spells, or its text."""
     word = text.strip()
     if word.lower() in ("true", "false"):
         return word.lower() == "true"
@@ -157,6 +159,7 @@ def _parse_cell(text: str) -> Any:
 
 
 def _numbered_lines(path: Path) -> Iterator[tuple[int, bytes]]:
+    """Yield each line with its number, from 1; ValueError for a line above `_MOST_BYTES`."""
     with open_regular(path, 2**62) as file:
         number = 0
         while line := file.readline(_MOST_BYTES + 1):
@@ -222,6 +225,7 @@ def _transition(values: Info, place: str) -> Logged:
 
 
 def _logged(row: Info, place: str) -> Logged:
+    """Return the transition of a row of columns; ``place`` names the row in errors."""
     try:
         terminated = _flag("terminated", row.get("terminations", False))
         truncated = _flag("truncated", row.get("truncations", False))
@@ -286,6 +290,7 @@ def _columns_of(values: Info, where: str = "dataset", *, is_episode: bool = Fals
 
 
 def _checked_column(name: str, column: Any) -> Any:
+    """Return a column, or the columns of a Dict or Tuple, as arrays or lists of elements."""
     if isinstance(column, Mapping):
         return {key: _checked_column(f"{name}[{key!r}]", part) for key, part in column.items()}
     if isinstance(column, tuple) and column and np.ndim(column[0]) > 0:

@@ -135,6 +135,7 @@ def _draw_mesh(
     axes: Axes, state_map: StateMap, numbers: Floats, colors: str | Colormap,
     limits: tuple[float, float] | None = None,
 ) -> object:  # fmt: skip
+    """Draw numbers over two inputs as colors; return what a color bar needs."""
     from matplotlib.ticker import MaxNLocator
 
     low, high = limits or (None, None)
@@ -190,6 +191,7 @@ def _draw_states(axes: Axes, state_map: StateMap, states: Floats) -> None:
 
 
 def _finish_curve(axes: Axes, state_map: StateMap, states: Floats) -> None:
+    """Label the axis of a curve over one input; mark the states met along it."""
     agent_input = state_map.inputs[0]
     axes.set_xlabel(axis_label(agent_input), fontsize=9, color=INK)
     style(axes)

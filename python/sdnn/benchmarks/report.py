@@ -57,6 +57,7 @@ def tables(results: Results) -> list[Table]:
 
 
 def _parts_table(results: Results) -> Table:
+    """Return the table of the times of each part of a decision, with a column for each network."""
     networks, acrobot = results["networks"], results["acrobot"]
     n_actions, n_corrected = networks[0]["n_actions"], networks[0]["n_corrected"]
     levels = results["instruction_sets"]

@@ -268,6 +268,7 @@ def _coarse_ranges(agent: AnyAgent, fraction_bits: int) -> Iterator[str]:
 
 
 def _read_agent_of(source: Path) -> AnyAgent:
+    """Read the agent of a run's folder or of an agent's file."""
     from sdnn.agents import load_agent
     from sdnn.runs.run import agent_of
 
@@ -330,6 +331,7 @@ def _new_agent(
 
 
 def _action_space(texts: Sequence[str]) -> gym.Space[Any]:
+    """Return the space of --actions: a Box of ranges, a Discrete, or a MultiDiscrete."""
     import gymnasium as gym
     import numpy as np
 
@@ -346,6 +348,7 @@ def _action_space(texts: Sequence[str]) -> gym.Space[Any]:
 
 
 def _bounds_in(option: str, text: str) -> tuple[float, float]:
+    """Return the numbers of LOW:HIGH; a usage error names the option."""
     low, _, high = text.partition(":")
     try:
         bounds = float(low), float(high)

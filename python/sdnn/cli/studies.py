@@ -141,6 +141,7 @@ def study_command(make_study: Callable[..., Study]) -> Function:
 def _make_executor(
     where: str, jobs: int | None, scheduler: str | None, timeout: float | None
 ) -> Executor:
+    """Return the executor of threads or of a Dask cluster; refuse options of the other one."""
     if where == "threads":
         for name, value in (("scheduler", scheduler), ("scheduler-timeout", timeout)):
             if value is not None:

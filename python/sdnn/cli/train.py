@@ -38,6 +38,7 @@ class SpecCommand(click.Command):
 
 @functools.cache
 def _options() -> list[click.Option]:
+    """Return the options of all settings in `KEYS`, with types and help from their JSON Schema."""
     from sdnn.runs.settings import schemas_of
     from sdnn.runs.spec import RunSpec
 
@@ -65,6 +66,7 @@ def _options() -> list[click.Option]:
 
 
 def _option_type(kind: Mapping[str, Any]) -> click.ParamType[Any]:
+    """Return Click's type for a setting's JSON Schema; 2^53 is the maximum of any whole number."""
     low, high = kind.get("minimum"), kind.get("maximum")
     if "enum" in kind:
         return click.Choice([word for word in kind["enum"] if word is not None])
@@ -200,6 +202,7 @@ def _options_by_key(env_id: str | None, options: Options) -> Options:
 
 
 def _named_range(text: str) -> tuple[str, list[float]]:
+    """Return variable, or "all", and bounds of [VARIABLE=]LOW:HIGH."""
     name, _, bounds = text.rpartition("=")
     low, colon, high = bounds.partition(":")
     try:

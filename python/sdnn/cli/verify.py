@@ -97,6 +97,7 @@ def verify(
 
 
 def _reports(source: Path | None, consent: Consent) -> Reports:
+    """Return what SOURCE reports: a folder's store, a CSV of reference results, or certificates."""
     if source is not None and source.is_dir():
         from sdnn.runs.reported import StoredReports
 

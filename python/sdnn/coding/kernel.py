@@ -182,6 +182,7 @@ def kernel_of_sums(
 
 
 def _read_pairs(pairs: Sequence[tuple[int, int]], n_inputs: int) -> tuple[tuple[int, int], ...]:
+    """Return pairs of inputs as tuples; ValueError if there is none, or one has no such input."""
     last = n_inputs - 1
     try:
         read = tuple((whole("pairs", a, 0, last), whole("pairs", b, 0, last)) for a, b in pairs)

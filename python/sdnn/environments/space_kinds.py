@@ -68,6 +68,7 @@ def _bounds_of_parts(space: Space) -> Iterator[tuple[Array, Array]]:
 
 
 def _n_variables(space: Space) -> int:
+    """Return the number of a space's variables; TypeError for a space that cannot be flattened."""
     if not isinstance(space, gym.Space):
         raise TypeError(
             f"observation_space must be a Gymnasium space, such as env.observation_space, got"

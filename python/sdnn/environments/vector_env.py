@@ -177,6 +177,7 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[Array, ArrayLike, Array]):
         return chosen
 
     def _tolerances_of(self, values: ArrayLike) -> NDArray[np.float64]:
+        """Return a goal tolerance for each environment, from a single one or from all."""
         tolerances = array_of("goal_tolerance", values, "fiu")
         if tolerances.shape not in ((), (self.num_envs,)):
             raise ValueError(
@@ -187,6 +188,7 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[Array, ArrayLike, Array]):
         return np.full(self.num_envs, tolerances, np.float64)
 
     def _begin(self, mask: NDArray[np.bool_]) -> None:
+        """Begin the episodes of the environments in a mask."""
         self._tolerances[mask] = self._goal_tolerance[mask]
         self._was_reset |= mask
         self._torques[mask] = 0.0

@@ -208,6 +208,7 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
         self.classes_ = classes
 
     def _check_outputs(self, y: Array, classes: ArrayLike | None) -> None:
+        """Raise ValueError for classes other than those of the first call."""
         if classes is not None and not np.array_equal(
             unique_labels(classes), np.sort(self.classes_)
         ):

@@ -143,6 +143,7 @@ class Experts(abc.ABC):
             self._learn(self.columns.row(sample), target)
 
     def _make(self, low: ArrayLike, high: ArrayLike, n_outputs: int) -> None:
+        """Make the experts for features of these lowest and highest values."""
         make, limit = _core.RecursiveLeastSquares, self.error_limit
         self.mean = make([], [], n_outputs, FORGETTING_OF_MEAN, limit)
         self.linear = [make(low, high, n_outputs, share, limit) for share in FORGETTING]

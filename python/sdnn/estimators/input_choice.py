@@ -219,6 +219,7 @@ class InputChoice:
             yield self._matrix(coding)[np.ix_(bins, bins)]
 
     def _solve(self, inputs: Inputs) -> Candidate:
+        """Fit kernel ridge regression with the inputs; return its errors without each sample."""
         shape = (len(self._table), len(self._table))
         total, squares = np.zeros(shape), np.zeros(shape)
         for correlations in self._correlations_of_each(inputs):

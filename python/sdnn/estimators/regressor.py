@@ -212,6 +212,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         return -weighted_mean((targets - counts) ** 2, weights)
 
     def _fitted_output_range(self, targets: Floats) -> Floats:
+        """Return the range of each output: `output_range`, or that of the targets and a margin."""
         if self.output_range is not None:
             try:
                 ranges = array_of("output_range", self.output_range, "iuf").astype(np.float64)

@@ -240,6 +240,7 @@ class ActorCriticLearner(Learner[_core.LinearSDNN], ActorCriticWriter):
         )
 
     def _learning_rule(self) -> Data:
+        """Return the macros of the learning rule; entropy counts units of 2^-16."""
         learning, state = self.agent.learning, self.agent._state_of("agent")
         first, last = learning.learning_rate, learning.final_learning_rate
         if "learning_rate" in state:

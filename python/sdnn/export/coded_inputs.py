@@ -93,6 +93,7 @@ def coded_input(column: int, coding: Coding) -> CodedInput:
 
 
 def _of_categories(column: int, coding: Coding, base: Categorical) -> CodedInput:
+    """Return the input of a categorical column: words, or numbers that doubles hold exactly."""
     categories = base.categories or ()
     if len(categories) >= _MOST_VALUES:
         raise ValueError(

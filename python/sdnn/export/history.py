@@ -143,6 +143,7 @@ class StateHistory:
             self._add_observer(tables, acts_between)
 
     def _add_observer(self, tables: Tables, acts_between: bool) -> None:
+        """Add the tables of the observer's model, and of the actions of a Box that it observes."""
         fitted = {
             name.removeprefix("observer."): values
             for name, values in self.fitted.items()
@@ -209,6 +210,7 @@ class StateHistory:
         return [self._call(i, source) for i, source in enumerate(self.inputs)]
 
     def _call(self, i: int, source: Input) -> str:
+        """Return the macro call that computes an input from the observed variables."""
         first = source.at[0]
         if source.kind == "angle":
             return f"ANGLE({i}, {first}, {source.at[1]})"

@@ -127,6 +127,7 @@ class QLambdaLearner(Learner[_core.LinearSDNN], QLambdaWriter):
         )
 
     def _learning_rule(self) -> Data:
+        """Return the macros of the learning rule."""
         learning = self.agent.learning
         number, exponent = self.tolerance()
         n_symbols = self.agent.approximator.n_symbols

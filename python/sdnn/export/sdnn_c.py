@@ -97,6 +97,7 @@ class SDNNCWriter(Writer[_core.SDNNC]):
         return self.write("sdnn_greedy_c.h", description, needs, defines, tables, **sizes)
 
     def _add_ranks(self, tables: Tables) -> None:
+        """Add the ranks of values, so that C compares whole numbers, and which ranks tie."""
         networks = self.networks
         values = networks[0].output_values()
         if any((network.output_values() != values).any() for network in networks):

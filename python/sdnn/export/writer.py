@@ -97,6 +97,7 @@ class Writer(ABC, Generic[Network]):
         return self.history.stack_bytes + self.history.episode_bytes
 
     def _inputs(self) -> list[Input]:
+        """Return the agent's inputs, their bins without those of missing readings."""
         inputs = []
         for i, (kind, at) in enumerate(self.agent.inputs):
             low, high = (float(end[at[0]]) for end in self.agent.observation_range)
@@ -112,6 +113,7 @@ class Writer(ABC, Generic[Network]):
         return np.stack(actions, axis=1).astype(self.agent.action_space.dtype)
 
     def _checked_fraction_bits(self, given: int | None) -> int:
+        """Return checked fraction bits, or by default as many as fit numbers of 32 bits."""
         ranges = [source for source in self.inputs if source.kind in ("variable", "circular")]
         numbers = [abs(end) for source in ranges for end in (source.low, source.high)]
         if self.box is not None:
@@ -252,6 +254,7 @@ class Writer(ABC, Generic[Network]):
         ]
 
     def _usage(self) -> list[str]:
+        """Return the lines of the header that show how to call it."""
         observation = f"int32_t observation[{self.name.upper()}_N_OBSERVED];"
         return [
             f"  {observation} // in its own units, times 2^{self.fraction_bits}",
@@ -297,6 +300,7 @@ class Writer(ABC, Generic[Network]):
         return f"{self.name}_action_fixed{index} / 2^{self.fraction_bits}"
 
     def _float_tables(self) -> list[str]:
+        """Return the table of a Box's actions as floating-point numbers, or no lines."""
         if self.box is None:
             return []
         is_double = self.box.dtype == np.float64

@@ -331,6 +331,7 @@ def read_model_file(
 
 
 def _parse_input(text: str, n_units: int) -> LibsdnnInput:
+    """Return the coding of an input; patterns flip fewer than half of their units."""
     match = re.fullmatch(r"(NUMERICAL|SYMBOLIC)\(RANDOM_INVERSE\(([^,]*),([^,]*)\)\)", text)
     if match is None:
         raise ValueError(
@@ -376,6 +377,7 @@ def _parse_pairs(entries: Entries, n_inputs: int) -> tuple[tuple[int, int], ...]
 
 
 def _parse_parameters(text: str, path: Path) -> LibsdnnParameters:
+    """Read a parameter file; ValueError names the entry that is missing or out of range."""
     entries = Entries(text, path)
     task = entries.one_of("ISSUE/type", "function_approximation", "pattern_recognition")
     n_inputs = entries.whole("ISSUE/input_number", 1, 10000)

@@ -202,15 +202,15 @@ BAD_MASKS = {
 
 @pytest.mark.parametrize("actions", SPACES)
 def test_masks_of_wrong_size_or_type_are_refused(actions):
-    agent, same = (new_agent(SDNNQLambda, Masked(actions)) for _ in range(2))
-    action = same.act([0.0, 0.0], explore=False)
+    agent, untouched = (new_agent(SDNNQLambda, Masked(actions)) for _ in range(2))
+    action = untouched.act([0.0, 0.0], explore=False)
     for mask in BAD_MASKS[actions]:
         with pytest.raises(ValueError, match=r"^mask "):
             agent.act([0.0, 0.0], mask=mask)
         with pytest.raises(ValueError, match=r"^next_mask "):
             agent.learn(Transition([0.0, 0.0], action, 0.0, [0.5, 0.5], False, mask))
     assert agent.act([0.0, 0.0], explore=False).tolist() == action.tolist()
-    assert states_equal(agent, same)
+    assert states_equal(agent, untouched)
 
 
 def test_a_mask_of_several_dimensions_may_be_parts_or_a_flat_array():

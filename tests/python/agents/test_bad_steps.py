@@ -25,7 +25,7 @@ class Point(gym.Env):
     observation_space = gym.spaces.Box(-1.0, 1.0, (2,), np.float64)
     action_space = gym.spaces.Discrete(2)
 
-    def __init__(self, change=lambda made: made, change_reset=lambda made: made):
+    def __init__(self, change=lambda result: result, change_reset=lambda result: result):
         self._change, self._change_reset = change, change_reset
 
     def reset(self, *, seed=None, options=None):
@@ -35,8 +35,8 @@ class Point(gym.Env):
 
     def step(self, action):
         self._n += 1
-        made = (np.zeros(2), 1.0, False, self._n == 4, {})
-        return self._change(made) if self._n == 3 else made
+        result = (np.zeros(2), 1.0, False, self._n == 4, {})
+        return self._change(result) if self._n == 3 else result
 
 
 class Points(gym.vector.VectorEnv):

@@ -196,13 +196,13 @@ def test_irrelevant_inputs_are_left_out_also_after_loading(tmp_path):
         env.observation_space, env.action_space, preset="small", seed=1, inputs="relevant"
     )
     agent.train(env, steps=1001, seed=1)
-    kept = [variables[0] for _, variables in agent.inputs]
-    assert kept[:4] == [0, 1, 2, 3]
-    assert len(kept) <= 5  # of ten
+    chosen = [variables[0] for _, variables in agent.inputs]
+    assert chosen[:4] == [0, 1, 2, 3]
+    assert len(chosen) <= 5  # of ten
     agent.save(tmp_path / "agent.safetensors")
     loaded = load_agent(tmp_path / "agent.safetensors")
     assert loaded.inputs == agent.inputs
-    assert agent.learning_report()["left_out"] == [i for i in range(10) if i not in kept]
+    assert agent.learning_report()["left_out"] == [i for i in range(10) if i not in chosen]
     observation = np.linspace(-0.1, 0.1, 10)
     np.testing.assert_array_equal(loaded.q_values(observation), agent.q_values(observation))
 
@@ -211,9 +211,9 @@ def test_listed_inputs_are_kept_although_irrelevant():
     env = _Distracted(gym.make("CartPole-v1"), 6)
     agent = sdnn_agent(env.observation_space, inputs=[9, 6])
     agent.train(env, steps=1001, seed=1)
-    kept = [variables[0] for _, variables in agent.inputs]
-    assert {0, 1, 2, 3, 6, 9} <= set(kept), "the variables of CartPole, and the listed ones"
-    assert len(kept) <= 7, "at most one irrelevant variable more"
+    chosen = [variables[0] for _, variables in agent.inputs]
+    assert {0, 1, 2, 3, 6, 9} <= set(chosen), "the variables of CartPole, and the listed ones"
+    assert len(chosen) <= 7, "at most one irrelevant variable more"
 
 
 def test_listing_a_variable_keeps_its_whole_symbol_or_angle():

@@ -131,13 +131,13 @@ def test_a_goal_tolerance_holds_from_the_next_episode_of_each_environment():
 def test_modifying_returned_arrays_does_not_change_the_environment():
     envs = AcrobotSwingUpVectorEnv(2)
     first = envs.reset()
-    kept = [first[0].copy(), first[1]["state"].copy(), first[1]["goal_tolerance"].copy()]
+    copies = [first[0].copy(), first[1]["state"].copy(), first[1]["goal_tolerance"].copy()]
     for array in (first[0], *first[1].values()):
         array[:] = 1
     second = envs.reset(seed=0)
-    np.testing.assert_array_equal(second[0], kept[0])
-    np.testing.assert_array_equal(second[1]["state"], kept[1])
-    np.testing.assert_array_equal(second[1]["goal_tolerance"], kept[2])
+    np.testing.assert_array_equal(second[0], copies[0])
+    np.testing.assert_array_equal(second[1]["state"], copies[1])
+    np.testing.assert_array_equal(second[1]["goal_tolerance"], copies[2])
 
 
 def test_bad_actions_are_refused_by_index_and_change_nothing():

@@ -391,11 +391,11 @@ def test_predictions_average_the_networks_of_three_epochs(tmp_path):
 
 
 def test_averaged_networks_count_towards_the_memory_limit():
-    plain = {**REGRESSOR, "output_range": (-3, 3)}
-    model = SDNNRegressor(**plain, max_iter=2).fit(X, Y)
+    unaveraged = {**REGRESSOR, "output_range": (-3, 3)}
+    model = SDNNRegressor(**unaveraged, max_iter=2).fit(X, Y)
     weights = 4 * model.weights_.size
     table_bytes = code_bytes(model.codings_, model.pairs_, model.network_.input_code.core.n_units)
-    options = {**plain, "n_averaged_epochs": 5}
+    options = {**unaveraged, "n_averaged_epochs": 5}
     # Every third epoch is averaged: the last of 16 and four before it, of 9 only two. Early
     # stopping keeps four before the best epoch as well, unless it refits.
     for changes, n_networks in [
@@ -405,8 +405,8 @@ def test_averaged_networks_count_towards_the_memory_limit():
         ({"max_iter": 16, "early_stopping": True, "refit": True}, 5),
     ]:
         limit = n_networks * weights + table_bytes
-        SDNNRegressor(**options, **changes, training="plain", memory_limit=limit).fit(X, Y)
-        model = SDNNRegressor(**options, **changes, training="plain", memory_limit=limit - 1)
+        SDNNRegressor(**options, **changes, training="unaveraged", memory_limit=limit).fit(X, Y)
+        model = SDNNRegressor(**options, **changes, training="unaveraged", memory_limit=limit - 1)
         with pytest.raises(ValueError, match=f"{n_networks} networks"):
             model.fit(X, Y)
         model.partial_fit(X, Y).learn_one(X[0], Y[0])  # which average nothing

@@ -23,28 +23,30 @@ COMPILERS = {
 def headers():
     """A header of each kind, by name."""
     learners = ("network", "paper_rule", "actor_vector", "dutch", "several", "states")
-    made = {}
+    header_by_name = {}
     for name in learners:
-        made[name] = c_header(getattr(c_learners, name)(), name, learning=True)
+        header_by_name[name] = c_header(getattr(c_learners, name)(), name, learning=True)
     for name in ("observer", "actor-averages"):
         agent = c_learners.LEARNERS[name]()
         prefix = name.replace("-", "_")
-        made[prefix] = c_header(agent, prefix, learning=True)
-        made[f"{prefix}_policy"] = c_header(agent, f"{prefix}_policy")
+        header_by_name[prefix] = c_header(agent, prefix, learning=True)
+        header_by_name[f"{prefix}_policy"] = c_header(agent, f"{prefix}_policy")
     for name in ("linear", "actor", "pairs", "several"):
-        made[f"{name}_policy"] = c_header(agents()[name], f"{name}_policy")
+        header_by_name[f"{name}_policy"] = c_header(agents()[name], f"{name}_policy")
     for kind, missing in (("q-lambda", "hold"), ("actor-critic", "code"), ("sdnn-c", "hold")):
         agent = new_agent(
             box(1.0, 2.0), gym.spaces.Discrete(2), kind=kind, missing=missing,
             approximator=c_learners.NETWORK if kind == "sdnn-c" else c_learners.SMALL,
         )  # fmt: skip
-        made[missing + kind[0]] = c_header(agent, missing + kind[0], learning=True)
-        made[f"{missing + kind[0]}_policy"] = c_header(agent, f"{missing + kind[0]}_policy")
+        header_by_name[missing + kind[0]] = c_header(agent, missing + kind[0], learning=True)
+        header_by_name[f"{missing + kind[0]}_policy"] = c_header(
+            agent, f"{missing + kind[0]}_policy"
+        )
     model, _ = fitted("categories")
-    made["classes"] = estimator_header(model, "classes")
-    made["learning_classes"] = estimator_header(model, "learning_classes", learning=True)
-    made["kernels"] = estimator_header(fitted_kernel("directions")[0], "kernels")
-    return made
+    header_by_name["classes"] = estimator_header(model, "classes")
+    header_by_name["learning_classes"] = estimator_header(model, "learning_classes", learning=True)
+    header_by_name["kernels"] = estimator_header(fitted_kernel("directions")[0], "kernels")
+    return header_by_name
 
 
 @pytest.fixture(scope="module")

@@ -86,17 +86,17 @@ BAD = {
 
 def endless():
     """A list that contains itself."""
-    made = []
-    made.append(made)
-    return made
+    items = []
+    items.append(items)
+    return items
 
 
 def deep(kind, levels=100_000):
     """Lists in lists, or tuples in tuples, beyond the depth at which Python gives up."""
-    made = kind()
+    nested = kind()
     for _ in range(levels):
-        made = kind([made])
-    return made
+        nested = kind([nested])
+    return nested
 
 
 SPACES = {

@@ -202,7 +202,7 @@ METHODS = {
 }  # fmt: skip
 
 
-def made(name):
+def valid_object(name):
     return getattr(core, name)(**GOOD[name]())
 
 
@@ -299,7 +299,9 @@ def _argument_cell(name, parameter, value):
 
 
 def _method_cell(name, method, good, parameter, value):
-    return lambda: _judged(lambda: getattr(made(name), method)(**{**good, parameter: value()}))
+    return lambda: _judged(
+        lambda: getattr(valid_object(name), method)(**{**good, parameter: value()})
+    )
 
 
 def _judged(call):

@@ -63,12 +63,12 @@ def contents_of(folder, pattern):
 def estimators():
     coding = [("circular", [0]), (WithMissing(base=Symbolic()), [1])]
     rounded = np.round(X, 1)
-    made = (
+    models = (
         SDNNRegressor(n_output_units=9, **SMALL).fit(X, X[:, 0]),
         SDNNRegressor(coding, n_output_units=9, **SMALL).fit(rounded, X[:, 0]),
         SDNNClassifier(n_units_per_class=2, **SMALL).fit(X, X[:, 0] > X[:, 1]),
     )
-    return written(*(model.save for model in made))
+    return written(*(model.save for model in models))
 
 
 def read_estimator(path):

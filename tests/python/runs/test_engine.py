@@ -90,22 +90,22 @@ def test_a_trial_that_fails_in_a_team_does_not_affect_the_others(tmp_path, monke
 
 
 def test_stored_trials_are_not_run_again(tmp_path, run):
-    made = []
+    run_seeds = []
 
     def make(*, seed, **parts):
-        made.append(seed)
+        run_seeds.append(seed)
         return fake_trial.FakeTrial(seed=seed, **parts)
 
     run(tmp_path, fake_trial.make_plan(2), make)
-    assert len(made) == 2 * len(fake_trial.CASES) == 4
+    assert len(run_seeds) == 2 * len(fake_trial.CASES) == 4
     outcome, digest = run(tmp_path, fake_trial.make_plan(3), make)
     assert (outcome.n_planned, outcome.n_reused, outcome.n_run) == (6, 4, 2)
-    assert len(made) == 6
+    assert len(run_seeds) == 6
     assert run(tmp_path, fake_trial.make_plan(3), make) == (
         type(outcome)(n_planned=6, n_reused=6, n_run=0, failures=(), interrupted=False),
         digest,
     )
-    assert len(made) == 6
+    assert len(run_seeds) == 6
 
 
 @pytest.mark.parametrize("change", [{"root_seed": 1}, {"n_episodes": 310}])
@@ -159,16 +159,16 @@ def test_a_trial_that_raises_an_exit_or_interrupt_fails(tmp_path, run, exception
 
 def test_ctrl_c_keeps_finished_trials_and_the_next_run_resumes(tmp_path, run):
     # Ctrl-C comes while the second trial runs: it is abandoned, the first stays stored.
-    made = []
+    begun_seeds = []
     before = signal.getsignal(signal.SIGINT)
 
     class Interrupting(fake_trial.FakeTrial):
         def __init__(self, *, seed, **parts):
             super().__init__(seed=seed, **parts)
-            made.append(seed)
+            begun_seeds.append(seed)
 
         def advance(self, n):
-            if len(made) < 2:
+            if len(begun_seeds) < 2:
                 super().advance(n)
             elif not self.sent:  # from here on it never ends by itself
                 self.sent = True
@@ -194,18 +194,18 @@ def test_an_error_of_the_store_stops_the_run(tmp_path, use_trial):
         def add(self, record, *, is_exact=True):
             raise StoreError("disk full")
 
-    made = []
+    begun_seeds = []
 
     class Counted(fake_trial.SlowTrial):
         def __init__(self, *, seed, **parts):
             super().__init__(seed=seed, **parts)
-            made.append(seed)
+            begun_seeds.append(seed)
 
     use_trial(Counted)
     plan = fake_trial.make_plan(10, 50)
     with Full(tmp_path) as store, pytest.raises(StoreError, match="disk full"):
         run_trials(plan, store, executor=ThreadExecutor(1))
-    assert len(made) < len(plan)
+    assert len(begun_seeds) < len(plan)
 
 
 class Scripted:

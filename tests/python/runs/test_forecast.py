@@ -19,11 +19,11 @@ learning.discount = [0.8, 0.9]
 
 
 def test_forecasts_use_stored_trials_or_else_one_probe(use_trial, study, tmp_path, monkeypatch):
-    made = []
+    probed_seeds = []
 
     class Probed(fake_trial.FakeTrial):
         def __init__(self, **options):
-            made.append(options["seed"])
+            probed_seeds.append(options["seed"])
             super().__init__(**options)
 
         def advance(self, n):
@@ -47,7 +47,7 @@ def test_forecasts_use_stored_trials_or_else_one_probe(use_trial, study, tmp_pat
     for name in ("base", "discount=0.9"):
         assert by_variant[name]["seconds_of_a_trial"] == pytest.approx(probed)
         assert by_variant[name]["source"].startswith("the first ")
-    assert len(made) == 2 + 1  # tried, but for one that is the same, and one probe
+    assert len(probed_seeds) == 2 + 1  # tried, but for one that is the same, and one probe
     assert forecast["seconds"] == pytest.approx(3.0 + 2 * probed)
 
 

@@ -186,13 +186,15 @@ def test_a_run_may_end_before_its_first_checkpoint(tmp_path):
 
 
 def test_a_run_makes_training_and_evaluation_environment_once(tmp_path, monkeypatch):
-    made = []
+    noise_streams = []
     make = EnvironmentSpec.make
     monkeypatch.setattr(
-        EnvironmentSpec, "make", lambda self, *args: made.append(args[0]) or make(self, *args)
+        EnvironmentSpec,
+        "make",
+        lambda self, *args: noise_streams.append(args[0]) or make(self, *args),
     )
     Run.create(tmp_path / "run", run_spec(CONFIG, n_envs=1)).train()
-    assert sorted(made) == ["evaluation_sensor_noise", "sensor_noise"]
+    assert sorted(noise_streams) == ["evaluation_sensor_noise", "sensor_noise"]
 
 
 def test_create_refuses_folders_with_a_run_or_other_files(whole, tmp_path):
