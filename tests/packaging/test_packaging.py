@@ -60,11 +60,11 @@ def rows_of_trial():
 
 def test_the_cpp_example_runs_with_an_installed_prefix(cmake, configure, tmp_path, skip_unless_ci):
     prefix = tmp_path / "prefix"
-    for done in (
+    for process in (
         configure(ROOT, tmp_path / "library", f"-DCMAKE_INSTALL_PREFIX={prefix}"),
         cmake("--install", tmp_path / "library"),
     ):
-        assert done.returncode == 0, done.stdout + done.stderr
+        assert process.returncode == 0, process.stdout + process.stderr
     installed = {path.relative_to(prefix).as_posix() for path in prefix.rglob("*.hpp")}
     sources = ROOT / "cpp" / "include"
     assert installed == {

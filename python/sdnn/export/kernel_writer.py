@@ -48,7 +48,7 @@ class KernelWriter(HeaderText):
 
     @property
     def _has_all_pairs(self) -> bool:
-        """Whether sums over inputs replace the loop over pairs: with two they would save nothing."""
+        """Whether sums over inputs replace the loop over pairs; for two they save nothing."""
         return self.kernel.has_all_pairs and len(self.inputs) > 2
 
     def about(self) -> str:

@@ -111,15 +111,7 @@ def test_schedules_with_bad_functions_or_unsuitable_agents_are_refused():
     refuses("epsilon", Schedule, epsilon=0.1, error=TypeError)
     env = gym.make("Pendulum-v1")
     agent = FuzzyQLearning(env.observation_space, env.action_space)
-    refuses(
-        "agent",
-        agent.train,
-        env,
-        steps=5,
-        callbacks=[Schedule(epsilon=lambda progress: 0.1)],
-        error=TypeError,
-    )
+    allowed, too_large = ([Schedule(epsilon=lambda _, e=e: e)] for e in (0.1, 2.0))
+    refuses("agent", agent.train, env, steps=5, callbacks=allowed, error=TypeError)
     agent = SDNNQLearning(env.observation_space, env.action_space, approximator=SMALL)
-    refuses(
-        "epsilon", agent.train, env, steps=5, callbacks=[Schedule(epsilon=lambda progress: 2.0)]
-    )
+    refuses("epsilon", agent.train, env, steps=5, callbacks=too_large)

@@ -172,12 +172,6 @@ def test_processor_time_excludes_evaluations(scripts, monkeypatch):
     assert clock.curve["cpu_seconds"][-1] < 0.3  # far less than the evaluations took
 
 
-def fail_in_store(measured, folder):
-    with contextlib.suppress(RuntimeError), measured.opened(folder) as store:
-        store.put("squares", '["c", 3]', {"square": 9})
-        raise RuntimeError
-
-
 def test_a_failed_measurement_does_not_stop_others_or_change_the_packed_store(
     scripts, tmp_path, capsys
 ):
@@ -191,7 +185,9 @@ def test_a_failed_measurement_does_not_stop_others_or_change_the_packed_store(
     measured.measure_missing("squares", abs, keys, options_of(tmp_path))  # which would fail
     assert measured.measured("squares", tmp_path) == squares
     packed = (tmp_path / measured.PACKED).read_bytes()
-    fail_in_store(measured, tmp_path)
+    with contextlib.suppress(RuntimeError), measured.opened(tmp_path) as store:
+        store.put("squares", '["c", 3]', {"square": 9})
+        raise RuntimeError
     assert (tmp_path / measured.PACKED).read_bytes() == packed
     assert len(measured.measured("squares", tmp_path)) == 3
 

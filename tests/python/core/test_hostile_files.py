@@ -171,15 +171,18 @@ def test_a_journal_rolls_back_but_cannot_remove_other_files(tmp_path):
     path, victim = make_store(tmp_path), tmp_path / "mine.txt"
     expected = content_of(tmp_path)
     journal = hot_journal(path)
-    whole, rest = journal.read_bytes(), path.read_bytes()
+    journal_bytes, store_bytes = journal.read_bytes(), path.read_bytes()
     assert content_of(tmp_path) == expected, "rolled back"
     # SQLite removes the file that a journal names as that of a transaction over several files.
     victim.write_bytes(b"mine")
+    # Such a record has the number of the page at 1 GiB, the file's name, its length and checksum,
+    # and the 8 bytes with which a journal begins.
     name = os.fsencode(victim)
     checksum = sum(struct.unpack(f"{len(name)}b", name)) % 2**32
-    page = struct.pack(">I", 0x40000000 // 4096 + 1)
-    journal.write_bytes(whole + page + name + struct.pack(">II", len(name), checksum) + whole[:8])
-    path.write_bytes(rest)
+    page = struct.pack(">I", 2**30 // 4096 + 1)
+    record = page + name + struct.pack(">II", len(name), checksum) + journal_bytes[:8]
+    journal.write_bytes(journal_bytes + record)
+    path.write_bytes(store_bytes)
     for read_only in (True, False):
         with pytest.raises(StoreError, match="journal"):
             ResultStore(tmp_path, read_only=read_only)

@@ -94,6 +94,7 @@ def test_calibration_lowers_the_loss_where_classes_overlap():
 
 def test_calibration_uses_sample_weights_and_ignores_samples_of_weight_0():
     X, y = overlapping(200)
+    # Fifty samples with the wrong class have weight 0.
     flipped = np.concatenate([y, 1 - y[:50]])
     weights = np.concatenate([np.ones(200), np.zeros(50)])
     model = SDNNClassifier(**OPTIONS, calibrate=True)
@@ -150,7 +151,7 @@ def test_several_outputs_have_separate_intervals_and_samples_of_weight_0_are_not
     X, y = noisy(100)
     model = SDNNRegressor(**OPTIONS, calibrate=True).fit(X, np.stack([y, 10 * y], axis=1))
     bounds = model.predict_interval(X, 0.6)
-    assert bounds.shape == (100, 2, 2)
+    assert bounds.shape == (100, 2, 2)  # samples, lower and upper bound, outputs
     weights = np.tile([1.0, 2.0, 0.0, 1.0], 25)
     weighted = SDNNRegressor(**OPTIONS, calibrate=True).fit(X, y, weights)
     assert set(weighted.held_out_counts_) <= {1.0, 2.0}

@@ -78,18 +78,17 @@ def test_settings_of_numpy_and_pandas_types_are_saved(model, tmp_path):
     model.set_params(max_iter=2, n_pattern_units=np.int64(62)).fit(FRAME, LABELS)
     path = tmp_path / "model.safetensors"
     model.save(path)
-    same = type(model).load(path)
-    np.testing.assert_array_equal(same.predict(FRAME), model.predict(FRAME))
-    assert same.codings_ == model.codings_
+    loaded = type(model).load(path)
+    np.testing.assert_array_equal(loaded.predict(FRAME), model.predict(FRAME))
+    assert loaded.codings_ == model.codings_
     if isinstance(model, SDNNClassifier):
-        assert same.class_weight == model.class_weight
+        assert loaded.class_weight == model.class_weight
     elif not isinstance(model.coding, list):
-        assert same.coding == model.coding
-    again = [
-        clone(estimator).set_params(random_state=0).fit(FRAME, LABELS)
-        for estimator in (same, model)
-    ]
-    np.testing.assert_array_equal(again[0].weights_, again[1].weights_)
+        assert loaded.coding == model.coding
+    # Unfitted copies of both learn the same.
+    clones = [clone(estimator).set_params(random_state=0) for estimator in (loaded, model)]
+    first, second = (unfitted.fit(FRAME, LABELS).weights_ for unfitted in clones)
+    np.testing.assert_array_equal(first, second)
 
 
 def test_columns_chosen_by_functions_or_iterators_cannot_be_saved(tmp_path):

@@ -205,14 +205,10 @@ def test_pandas_categories_and_nullable_numbers_have_the_bits_of_objects():
     y = random.uniform(size=40)
     options = {"coding": [("symbolic", ["kind"])], "n_pattern_units": 32, "random_state": 0}
     model = SDNNRegressor(**options).fit(frame, y)
-    plain = pd.DataFrame(
-        {
-            name: frame[name].astype(str if name == "kind" else float).astype(object)
-            for name in frame
-        }
-    )
-    np.testing.assert_array_equal(model.predict(frame), model.predict(plain))
-    np.testing.assert_array_equal(model.weights_, SDNNRegressor(**options).fit(plain, y).weights_)
+    types = {name: str if name == "kind" else float for name in frame}
+    objects = frame.astype(types).astype(object)
+    np.testing.assert_array_equal(model.predict(frame), model.predict(objects))
+    np.testing.assert_array_equal(model.weights_, SDNNRegressor(**options).fit(objects, y).weights_)
     row = frame.iloc[0].to_dict()
     assert model.predict_one(row) == model.predict(frame)[0]
 
@@ -274,8 +270,8 @@ def test_categorical_columns_survive_selection_of_pairs_and_saving(tmp_path):
     model = SDNNRegressor(pairs="auto", **SMALL).fit(typed, TARGETS)
     model.partial_fit(typed, TARGETS)
     model.save(tmp_path / "model")
-    same = SDNNRegressor.load(tmp_path / "model")
-    np.testing.assert_array_equal(same.predict(typed), model.predict(TABLE))
+    loaded = SDNNRegressor.load(tmp_path / "model")
+    np.testing.assert_array_equal(loaded.predict(typed), model.predict(TABLE))
 
 
 @pytest.mark.parametrize("estimator", [SDNNClassifier, SDNNKernelClassifier])

@@ -121,9 +121,10 @@ def test_coverage_within_0_and_1_with_enough_samples_is_required():
     nine = model.fit(X[:9], X[:9, 0])  # 9 is the least for 0.9, and 10 for 0.91
     assert nine.predict_interval(X[:2], 0.9).shape == (2, 2)
     refuses("coverage", nine.predict_interval, X, 0.91)
+    # Coverage c needs c / (1 - c) samples.
     assert "99 samples" in str(refuses("coverage", model.predict_interval, X, 0.99))
     refuses("scaled", model.predict_interval, X, scaled="yes", error=TypeError)
-    constant = SDNNKernelRidge().fit(X[:20], np.ones(20))
+    constant = SDNNKernelRidge().fit(X[:20], np.ones(20))  # without errors: intervals of width 0
     np.testing.assert_allclose(constant.predict_interval(X[:3], scaled=True), 1.0, atol=1e-6)
 
 
@@ -156,8 +157,9 @@ def test_river_intervals_contain_their_share_of_targets_as_the_noise_changes():
         assert interval.center == pytest.approx(model.predict_one({"a": a, "b": b}))
         is_covered.append(y in interval)
         model.learn_one({"a": a, "b": b}, y)
+    # The noise grows at 900; each of 8 periods is covered nearly as well as all of them.
     assert abs(np.mean(is_covered[100:]) - 0.8) < 0.02
-    assert min(part.mean() for part in np.array_split(is_covered[100:], 8)) > 0.7
+    assert min(period.mean() for period in np.array_split(is_covered[100:], 8)) > 0.7
     assert model.clone().coverage == 0.8
     assert pickle.loads(pickle.dumps(model)).predict_one({"a": 0.1}, True) == model.predict_one(
         {"a": 0.1}, with_interval=True

@@ -406,7 +406,7 @@ def test_before_fitting_the_first_of_equally_frequent_labels_is_predicted(river)
     model = river.RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=50)
     for row, label in zip(ROWS, ["red", "green", "blue", "blue", "green", "red"], strict=False):
         model.learn_one(row, label)
-    assert model.predict_one(ROWS[0]) == "red"
+    assert model.predict_one(ROWS[0]) == "red", "each of three labels came twice, red first"
 
 
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")

@@ -245,7 +245,7 @@ def test_the_example_corrects_a_sensor_that_drifts(target, tmp_path):
     names = {}
     exec(code.replace("sensor.safetensors", str(tmp_path / "sensor.safetensors")), names)
     header = export_estimator_header(names["model"], tmp_path / "sensor.h", learning=True)
-    assert header.flash_bytes + CODE_BYTES < 2**17
+    assert header.flash_bytes + CODE_BYTES < 2**17  # the 128 kB of a small processor
     example = PAGE.parents[1] / "examples" / "c" / "drift.c"
     run(target.compiler, *STRICT, "-I", tmp_path, example, "-o", tmp_path / "drift", "-lm")
     first, corrected = map(int, run(tmp_path / "drift").split())
@@ -310,7 +310,7 @@ def test_weights_beyond_16_bits_are_refused():
     changed = copy.deepcopy(model)
     layer = model.network_.layer
     weights = layer.weights
-    weights[0, 0] = 40_000
+    weights[0, 0] = 40_000  # 32,512 = 127 * 256 is the largest of two bytes, each below 128
     code = model.network_.input_code
     changed.network_ = Network(code, 1, weights=weights, thresholds=layer.thresholds)
     for learning in (False, True):

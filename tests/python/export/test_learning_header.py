@@ -240,7 +240,7 @@ def test_greedy_actions_leave_the_agent_as_it_is_and_are_those_of_the_policy(
 
 
 def test_constants_become_fixed_point_at_compile_time(target, tmp_path):
-    # 0.3 * 65536 = 19660.8 and halves are rounded away from 0.
+    # Numbers are times 2^16: 0.3 gives 19660.8, 7 gives 458752; halves are rounded away from 0.
     (tmp_path / "agent.h").write_text(c_header(discrete(), "agent", learning=True).text)
     numbers = {"0.3": 19661, "-0.3": -19661, "1.5 / 65536": 2, "-1.5 / 65536": -2, "7": 458752}
     values = ", ".join(f"AGENT_FIXED({number})" for number in numbers)
@@ -255,7 +255,7 @@ def test_constants_become_fixed_point_at_compile_time(target, tmp_path):
         }}
     """
     printed = run(program(tmp_path, source, target.compiler, *STRICT)).split()
-    assert [int(number) for number in printed] == [*numbers.values(), 131072]
+    assert [int(number) for number in printed] == [*numbers.values(), 2 * 65536]
 
 
 @pytest.mark.parametrize("compiler", ["g++", "clang++"])

@@ -143,7 +143,7 @@ def test_the_command_exports_the_same_network(export, tmp_path):
     ],
 )
 def test_the_actions_option_accepts_counts_and_ranges(actions, space, export, tmp_path):
-    words = [word for one in actions for word in ("--actions", one)]
+    words = [word for action in actions for word in ("--actions", action)]
     done = export("--new", *GIVEN, *words)
     assert done.exit_code == 0, done.output
     agent = new_agent(SPACE, space, angles=[1])

@@ -135,6 +135,7 @@ def test_evenly_split_trials_leave_a_claim_undecided():
     assert judged[SOLVED_AT_END] == Verdict.UNDECIDED
 
 
+# The paper has 10 trials of 15,000 episodes, with a test after every tenth.
 @pytest.mark.parametrize("size", [{"n_trials": 9}, {"n_tests": 1499}])
 def test_fewer_trials_or_episodes_than_the_papers_are_not_judged(size):
     judged = verdicts([result("s4", "sdnn-c", 4, **size), result("s6", "sdnn-c", 4)])
@@ -161,7 +162,7 @@ def test_the_growth_of_costs_is_a_ratio_of_medians():
 def test_quick_costs_are_not_judged_and_a_slow_growth_of_rbf_costs_fails_the_claim():
     quick = [cost("sdnn-c", n, [10.0 * n] * 3, QUICK_COST) for n in (4, 8)]
     assert judge_claims([], quick)[0].checks[0].verdict == Verdict.NOT_JUDGED
-    of_rbf = [cost("rbf", 4, [1, 1]), cost("rbf", 8, [4, 4])]
+    of_rbf = [cost("rbf", 4, [1, 1]), cost("rbf", 8, [4, 4])]  # grows less than SDNN-C, by 4, not 5
     of_sdnn_c = [of_n for of_n in COSTS if of_n.series == "sdnn-c"]
     assert judge_claims([], of_sdnn_c + of_rbf)[0].verdict == Verdict.FAILS
 

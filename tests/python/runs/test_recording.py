@@ -70,7 +70,7 @@ def test_an_mp4_has_even_sides_and_every_frame(run, tmp_path):
 @pytest.mark.filterwarnings("ignore:.*render_modes")
 def test_environments_without_render_metadata_are_recorded(run, tmp_path, monkeypatch):
     monkeypatch.setattr(drifting_env.DriftingEnv, "metadata", {})
-    assert record(run, tmp_path / "x.gif", max_steps=3).n_frames == 4
+    assert record(run, tmp_path / "x.gif", max_steps=3).n_frames == 1 + 3  # the reset's, and steps'
     assert run.train(steps=101).has_pictures is False
 
 

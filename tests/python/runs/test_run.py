@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from unittest.mock import Mock
 
 import gymnasium as gym
 import numpy as np
@@ -257,10 +258,6 @@ def test_create_with_impossible_settings_writes_nothing(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def _no_locks(*_, **__):
-    raise OSError(errno.ENOLCK, "No locks available")
-
-
 def test_a_run_that_another_process_trains_is_refused(tmp_path, monkeypatch):
     run = Run.create(tmp_path / "run", CONFIG)
     code = f"from sdnn.runs import Run; Run.open({str(run.folder)!r}).train(steps=20)"
@@ -272,7 +269,8 @@ def test_a_run_that_another_process_trains_is_refused(tmp_path, monkeypatch):
     assert not run.rows()
     assert run.train(steps=20).n_steps == 20
     # Some file systems of networks have no locks.
-    monkeypatch.setattr("filelock.lock_descriptor", _no_locks)
+    no_locks = Mock(side_effect=OSError(errno.ENOLCK, "No locks available"))
+    monkeypatch.setattr("filelock.lock_descriptor", no_locks)
     assert run.train(steps=40).n_steps == 40
 
 
@@ -334,11 +332,10 @@ def test_rows_are_readable_before_the_first_checkpoint(tmp_path, whole, monkeypa
     assert contents(run) == contents(whole(CONFIG))
 
 
-def normalized_cart_pole():
-    return gym.wrappers.NormalizeObservation(gym.make("CartPole-v1").unwrapped)
-
-
 def test_a_resumed_run_keeps_the_statistics_of_wrappers(tmp_path):
+    def normalized_cart_pole():
+        return gym.wrappers.NormalizeObservation(gym.make("CartPole-v1").unwrapped)
+
     gym.register("tests/Normalized-v0", entry_point=normalized_cart_pole, max_episode_steps=60)
     spec = RunSpec.from_values(
         {

@@ -28,11 +28,11 @@ def test_a_stored_trial_is_loaded_exactly(tmp_path):
     with ResultStore(tmp_path / "new" / "folder") as store:
         store.add(make_record())
     with ResultStore(tmp_path / "new" / "folder") as store:
-        (back,) = store.load()
+        (loaded,) = store.load()
     expected = make_record()
-    assert replace(back, rows=expected.rows) == expected
+    assert replace(loaded, rows=expected.rows) == expected
     for name in ("episode", "steps", "episode_return", "solved"):
-        column = getattr(back.rows, name)
+        column = getattr(loaded.rows, name)
         np.testing.assert_array_equal(column, getattr(expected.rows, name))
         assert column.dtype == getattr(expected.rows, name).dtype
 
