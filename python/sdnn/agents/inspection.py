@@ -272,10 +272,12 @@ class Reader:
         return sum(best) if self.agent.kind == "q-lambda" else sum(best) / len(best)
 
     def _numbers_of(self, dimension: int) -> Floats:
+        """Return the actions of a dimension as numbers, in the order of their values."""
         n_actions = self._core.n_actions[dimension]
         return np.array([self._core.action_of(i, dimension) for i in range(n_actions)])
 
     def _act(self, state: Floats, mask: Flags | None) -> Floats:
+        """Return the greedy action in a state as the first of an episode."""
         self.forget()
         allowed = None if mask is None else mask.astype(np.uint8)
         return np.ravel(self._core.act(state, False, 0, allowed))

@@ -38,8 +38,8 @@ class KernelWriter(HeaderText):
                 f"model must have fewer than {_MOST_INPUTS} features for a C header, got"
                 f" {self.n_features}"
             )
-        pairs = zip(columns, self.kernel.codings, strict=True)
-        super().__init__(model, name, [coded_input(column, coding) for column, coding in pairs])
+        codings = zip(columns, self.kernel.codings, strict=True)
+        super().__init__(model, name, [coded_input(column, coding) for column, coding in codings])
         bins = [
             coding.bins(model.X_fit_[:, index]) for index, coding in enumerate(self.kernel.codings)
         ]

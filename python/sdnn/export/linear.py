@@ -83,6 +83,7 @@ class LinearWriter(Writer[_core.LinearSDNN]):
         learning, discount = self.agent.learning, round(self.agent.learning.discount * 32768)
         return {
             "DISCOUNT": discount,
+            # About log2(1 / (1 - discount)): values are that many times as large as rewards.
             "HORIZON_BITS": 16 - max(32768 - discount, 1).bit_length(),
             "TRACE_DECAY": round(learning.discount * learning.trace_decay * 8192),
             "SCHEDULE_STEPS": learning.schedule_steps,

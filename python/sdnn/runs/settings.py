@@ -89,6 +89,7 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 @functools.cache
 def _types_of_fields(kind: type[object]) -> Mapping[str, Any]:
+    """Return the annotation of each field of a table of settings."""
     try:
         hints = typing.get_type_hints(kind, include_extras=True)
     except (NameError, TypeError):  # annotations of a user's agent: accept any value
@@ -250,6 +251,7 @@ def with_n_inputs(approximator: PartSettings, n_inputs: int) -> PartSettings:
 
 
 def _path(table: str, name: str) -> str:
+    """Join the key of a table and a name, or an index such as "[0]"."""
     return f"{table}{'.' * bool(table and name and name[0] != '[')}{name}"
 
 

@@ -41,6 +41,7 @@ class Interrupts:
             signal.signal(number, handler)
 
     def _handle(self, number: int, _frame: FrameType | None) -> None:
+        """Note the first signal and ask to stop; a second one has its usual effect."""
         self.received = number
         self.__exit__()
         self._ask_to_stop()
