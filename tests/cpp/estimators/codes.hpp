@@ -10,12 +10,13 @@
 
 namespace sdnn::testing {
 
+/// A code of +1, 0 and -1, as bits of the slots that are not 0 and of those that are +1.
 struct Code {
   std::vector<std::uint64_t> active;
   std::vector<std::uint64_t> positive;
 
   coding::TernaryCode words() const { return {active.data(), positive.data()}; }
-  /// +1, 0 or -1.
+  /// The entry of a slot: +1, 0 or -1.
   int at(std::size_t slot) const {
     if ((active[slot / 64] >> slot % 64 & 1) == 0) return 0;
     return (positive[slot / 64] >> slot % 64 & 1) != 0 ? 1 : -1;
@@ -31,7 +32,7 @@ inline Code random_code(std::size_t n_words, core::Random& random) {
   return code;
 }
 
-/// Returns a code with some slots of another.
+/// Returns the code after `n_changes` entries, some perhaps twice, were replaced by random ones.
 inline Code neighbour_of(const Code& code, std::size_t n_changes, core::Random& random) {
   Code changed = code;
   const Code other = random_code(code.active.size(), random);

@@ -28,13 +28,15 @@ TEST(PDeltaRule, CorrectsTheNearestUnitsAndOfEqualOnesTheLowestIndex) {
   const std::vector<std::int32_t> potentials{5, -2, 0, 3, -2, -9};  // units 0 and 3 fire
   estimators::PDeltaRule rule(6, std::vector<double>{2.0, 4.0, 1.0, 3.49, 3.5, 0.0, 99.0, -99.0},
                               1);
-  EXPECT_EQ(apply(rule, 0, potentials), Pairs{});
-  EXPECT_EQ(apply(rule, 1, potentials), (Pairs{{1, 1}, {2, 1}}));  // 0, then -2 of unit 1
+  EXPECT_EQ(apply(rule, 0, potentials), Pairs{});  // the target of 2 is met
+  // Two more shall fire: unit 2 is nearest, then units 1 and 4, of which 1 has the lower index.
+  EXPECT_EQ(apply(rule, 1, potentials), (Pairs{{1, 1}, {2, 1}}));
   EXPECT_EQ(apply(rule, 2, potentials), (Pairs{{3, -1}}));
   EXPECT_EQ(apply(rule, 3, potentials), (Pairs{{2, 1}}));          // rounds to 3
   EXPECT_EQ(apply(rule, 4, potentials), (Pairs{{1, 1}, {2, 1}}));  // rounds to 4
   EXPECT_EQ(apply(rule, 5, potentials), (Pairs{{0, -1}, {3, -1}}));
-  EXPECT_EQ(apply(rule, 6, potentials), (Pairs{{1, 1}, {2, 1}, {4, 1}, {5, 1}}));
+  EXPECT_EQ(apply(rule, 6, potentials),
+            (Pairs{{1, 1}, {2, 1}, {4, 1}, {5, 1}}));  // all silent ones
   EXPECT_EQ(apply(rule, 7, potentials), (Pairs{{0, -1}, {3, -1}}));
 }
 
@@ -47,19 +49,20 @@ TEST(PDeltaRule, GroupsOfUnitsAreCorrectedSeparately) {
 TEST(PDeltaRule, CorrectsAShareOfTheDeficit) {
   const std::vector<std::int32_t> potentials{5, -2, 0, 3, -2, -9, -4, -1, 0};  // as above
   estimators::PDeltaRule rule(9, std::vector<double>{3.0, 4.0, 8.0, 9.0, 0.0}, 1, 0.25);
-  EXPECT_EQ(apply(rule, 0, potentials), (Pairs{{2, 1}}));          // .25 is at least one
-  EXPECT_EQ(apply(rule, 1, potentials), (Pairs{{2, 1}}));          // .5 rounds up
-  EXPECT_EQ(apply(rule, 2, potentials), (Pairs{{2, 1}, {8, 1}}));  // 1.5 rounds up
-  EXPECT_EQ(apply(rule, 3, potentials), (Pairs{{2, 1}, {8, 1}}));  // 1.75
+  // A quarter of the deficit, rounded, but at least one unit: two of the nine units fire.
+  EXPECT_EQ(apply(rule, 0, potentials), (Pairs{{2, 1}}));          // (3 - 2) / 4 = 0.25
+  EXPECT_EQ(apply(rule, 1, potentials), (Pairs{{2, 1}}));          // (4 - 2) / 4 = 0.5
+  EXPECT_EQ(apply(rule, 2, potentials), (Pairs{{2, 1}, {8, 1}}));  // (8 - 2) / 4 = 1.5
+  EXPECT_EQ(apply(rule, 3, potentials), (Pairs{{2, 1}, {8, 1}}));  // (9 - 2) / 4 = 1.75
   EXPECT_EQ(apply(rule, 4, potentials), (Pairs{{3, -1}}));
 }
 
 TEST(PDeltaRule, ComparesDistancesNear32BitsExactly) {
-  const std::int32_t far = 2000000000;
+  const std::int32_t far = 2000000000;  // near 2^31: no bits are left for an index beside it
   estimators::PDeltaRule rule(3, std::vector<double>{1.0, 2.0}, 1);
   EXPECT_EQ(apply(rule, 0, {-far, 1 - far, -far}), (Pairs{{1, 1}}));
   EXPECT_EQ(apply(rule, 1, {-far, 1 - far, -far}), (Pairs{{0, 1}, {1, 1}}));
-  EXPECT_EQ(apply(rule, 0, {far, far, 7}), (Pairs{{0, -1}, {2, -1}}));
+  EXPECT_EQ(apply(rule, 0, {far, far, 7}), (Pairs{{0, -1}, {2, -1}}));  // 3 fire, 1 should
 }
 
 TEST(ClassScheme, SchemesHaveNamesAndNumbersOfUnits) {
@@ -79,7 +82,8 @@ TEST(PerceptronRule, OneVersusRestCorrectsUnitsOfWrongSign) {
 }
 
 TEST(PerceptronRule, OneVersusOneCorrectsTheUnitsOfTheClass) {
-  // Units (0,1) (0,2) (0,3) (1,2) (1,3) (2,3).
+  // Units (0,1) (0,2) (0,3) (1,2) (1,3) (2,3): a unit should fire for its first class, and be
+  // silent for its second. All others are left alone.
   const std::vector<std::int32_t> labels{0, 2, 3};
   estimators::PerceptronRule rule(6, labels, 4, ClassScheme::one_vs_one);
   EXPECT_EQ(apply(rule, 0, {0, 0, 0, 0, 0, 0}), (Pairs{{0, 1}, {1, 1}, {2, 1}}));

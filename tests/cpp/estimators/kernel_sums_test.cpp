@@ -52,7 +52,8 @@ Reals matrix_of(const KernelSums& kernel, const Bins& bins) {
 
 TEST(KernelSums, IsTheMeanOverPairsByHand) {
   const std::vector inputs{falling(0.5, 4), InputCorrelations{{1.0, 0.25, 0.25, 1.0}, 2}};
-  // Correlations 1/4 and 1/4, then 1/2 and 1.
+  // The query (2, 1) correlates with the sample (0, 0) by 1/4 and 1/4, with (3, 1) by 1/2 and 1.
+  // The kernel is the mean of (1 + rho_i) / 2 * rho_j over the ordered pairs of inputs i != j.
   const double far = (1.25 / 2 * 0.25 + 1.25 / 2 * 0.25) / 2;
   const double near = (1.5 / 2 * 1.0 + 2.0 / 2 * 0.5) / 2;
   EXPECT_EQ(matrix_of({inputs, Bins{0, 0, 3, 1}, 2, 1}, {2, 1}), (Reals{far, near}));
@@ -71,7 +72,8 @@ TEST(KernelSums, PowersAndTablesAgree) {
 }
 
 TEST(KernelSums, ABinOfCorrelationZeroIsUnlikeAll) {
-  // A third bin for missing values, which the second input says to be alike.
+  // Bin 2 of the first input and bin 1 of the second are for missing values: the first input
+  // correlates them with nothing, the second with one another.
   const std::vector inputs{InputCorrelations{{1.0, 0.5, 0.0}, 3},
                            InputCorrelations{{0.0, 0.0, 0.0, 1.0}, 2}};
   const KernelSums kernel(inputs, Bins{0, 0, 2, 1}, 1, 1);

@@ -21,10 +21,12 @@ using testing::kNaN;
 using testing::predicted;
 using Numbers = std::vector<double>;
 
-/// An input between 0 and 1 that repeats late.
+/// Inputs between 0 and 1, spread evenly by the golden ratio, that repeat only after 500.
 double input_of(int i) { return std::fmod(0.618 * i, 1.0); }
 
 TEST(KernelWindow, IsKernelRidgeRegression) {
+  // The range of the input is 2, so a length scale of 0.5 ranges is 1. The ridge of 0.25 makes the
+  // diagonal of the matrix 1.25.
   KernelWindow window(Numbers{0.0}, Numbers{2.0}, 1, 10, 0.5, 0.25);
   EXPECT_EQ(predicted(window, {1.0}), 0.0);
   window.learn(Numbers{0.0}, Numbers{3.0});

@@ -141,8 +141,8 @@ TEST(OnlineLayer, RefusesWeightsBeyond14BitsAndBadArguments) {
   const std::size_t n_inputs = problem.code->n_inputs();
   EXPECT_THROW(online.present(std::span(problem.bins).first(n_inputs), rule),
                std::invalid_argument);
-  PDeltaRule of_more(2 * problem.n_units, problem.targets, problem.n_groups);
-  EXPECT_THROW(online.present(problem.bins, of_more), std::invalid_argument);
+  PDeltaRule rule_of_more_units(2 * problem.n_units, problem.targets, problem.n_groups);
+  EXPECT_THROW(online.present(problem.bins, rule_of_more_units), std::invalid_argument);
   std::vector<std::int32_t> bins = problem.bins;
   bins[0] = 1000;  // beyond the number of bins
   EXPECT_THROW(online.present(bins, rule), std::invalid_argument);

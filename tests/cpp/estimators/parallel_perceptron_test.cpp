@@ -40,7 +40,7 @@ TEST(ParallelPerceptron, PotentialsAndCountsAreAsWorkedByHand) {
   layer.potentials(bins, 1, potentials);
   EXPECT_EQ(potentials, (std::vector<std::int32_t>{1 + 2 - 3 - 1, -4 + 5 - 6 + 2,  //
                                                    -1 + 2 + 3 - 1, 4 + 5 + 6 + 2}));
-  std::vector<std::int32_t> counts(2);
+  std::vector<std::int32_t> counts(2);  // units with a positive potential: -1, -3; then 3, 17
   layer.counts(bins, 1, 1, counts);
   EXPECT_EQ(counts, (std::vector<std::int32_t>{0, 2}));
   counts.resize(4);
@@ -121,8 +121,8 @@ TEST(ParallelPerceptron, RethrowsTheErrorOfAThread) {
   const ParallelPerceptron layer(small_code(), 2, weights, std::vector<std::int32_t>(2));
   const std::vector<std::int32_t> bins(2000);
   for (const std::size_t query : {0U, 999U, 1999U}) {
-    const auto consume = [&](std::size_t asked, const std::int32_t*) {
-      if (asked == query) throw std::bad_alloc();
+    const auto consume = [&](std::size_t q, const std::int32_t*) {
+      if (q == query) throw std::bad_alloc();
     };
     EXPECT_THROW(layer.for_each_query(bins, 3, consume), std::bad_alloc) << query;
   }
@@ -139,7 +139,7 @@ TEST(ParallelPerceptron, DrawsEveryWeightInItsRange) {
 }
 
 TEST(ParallelPerceptron, RefusesWeightsThatCouldOverflow) {
-  const std::vector<std::int32_t> weights{1 << 30, 1 << 30, 0};
+  const std::vector<std::int32_t> weights{1 << 30, 1 << 30, 0};  // 2^31 does not fit, 2^31 - 1 does
   EXPECT_THROW(ParallelPerceptron(small_code(), 1, weights, std::vector<std::int32_t>{0}),
                std::overflow_error);
   const std::vector<std::int32_t> fits{1 << 30, (1 << 30) - 1, 0};

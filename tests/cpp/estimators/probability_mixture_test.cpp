@@ -34,6 +34,7 @@ TEST(ProbabilityMixture, SharesAloneAreTheProbabilities) {
 TEST(ProbabilityMixture, WeightsAreTheLikelihoodsOfShareAndThreeSteepnesses) {
   ProbabilityMixture mixture(1);
   mixture.learn(Numbers{0.5, 0.5}, Numbers{0.1, 0.6}, 1);
+  // The true class 1 has the share 0.5, and by scores 0.5 apart the logistic of 0.5 * steepness.
   Numbers likelihoods{0.5};
   for (const double steepness : {3.0, 6.0, 12.0}) {
     likelihoods.push_back(1.0 / (1.0 + std::exp(-0.5 * steepness)));

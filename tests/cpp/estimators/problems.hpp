@@ -34,6 +34,8 @@ inline coding::PatternTable random_table(std::size_t n_bins, std::size_t n_units
   return table;
 }
 
+/// A problem of random size: patterns need 1 to 3 words, and units 1 to 3 tiles. Some targets are
+/// below 0 or above the size of a group, and are clipped.
 inline Problem random_problem(std::uint64_t seed) {
   core::Random random(seed, core::Stream::exploration);
   const std::size_t n_inputs = 1 + random.below(3);
@@ -72,17 +74,19 @@ inline Problem random_problem(std::uint64_t seed) {
 }
 
 inline std::shared_ptr<estimators::ParallelPerceptron> layer_for(const Problem& problem) {
-  return std::make_shared<estimators::ParallelPerceptron>(problem.code, problem.n_units, 7);
+  constexpr std::uint64_t kSeed = 7;
+  return std::make_shared<estimators::ParallelPerceptron>(problem.code, problem.n_units, kSeed);
 }
 
 inline estimators::PDeltaTrainer trainer_for(const Problem& problem,
                                              std::shared_ptr<estimators::ParallelPerceptron> layer,
                                              estimators::TrainingForm form, int n_threads = 1) {
+  constexpr std::size_t kMemoryLimit = std::size_t{1} << 30;  // enough for every form
   return {std::move(layer),
           problem.bins,
           estimators::PDeltaRule(problem.n_units, problem.targets, problem.n_groups),
           form,
-          std::size_t{1} << 30,
+          kMemoryLimit,
           n_threads};
 }
 

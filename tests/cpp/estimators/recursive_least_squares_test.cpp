@@ -32,8 +32,8 @@ TEST(RecursiveLeastSquares, IsRidgeRegressionWithoutForgetting) {
   model.learn(Numbers{0.0}, Numbers{2.0});
   model.learn(Numbers{1.0}, Numbers{3.0});
   model.learn(Numbers{-1.0}, Numbers{0.5});
-  // Around the first target 2, with the precision 1/10 of both weights: (3 + 0.1) w0 = 1 - 1.5 and
-  // (2 + 0.1) w1 = 1 + 1.5.
+  // The targets minus the first one are 0, 1 and -1.5. With a ridge of 0.1 the normal equations of
+  // intercept and slope are (3 + 0.1) w0 = 1 - 1.5 and (2 + 0.1) w1 = 1 * 1 + (-1) * (-1.5).
   EXPECT_NEAR(predicted(model, {0.5}), 2.0 - 0.5 / 3.1 + 0.5 * 2.5 / 2.1, 1e-12);
 }
 
@@ -84,7 +84,7 @@ TEST(RecursiveLeastSquares, PredictsAFifthBeyondTheRangeOfTargetsAtMost) {
   auto model = unit_model(1);
   for (int i = 0; i < 100; ++i) model.learn(Numbers{i / 99.0}, Numbers{i / 99.0});
   EXPECT_GT(predicted(model, {1.1}), 1.05);
-  EXPECT_NEAR(predicted(model, {2.9}), 1.2, 1e-12);
+  EXPECT_NEAR(predicted(model, {2.9}), 1.2, 1e-12);  // targets reached from 0 to 1
 }
 
 TEST(RecursiveLeastSquares, LimitedErrorsKeepAnOutlierOut) {

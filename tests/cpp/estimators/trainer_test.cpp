@@ -18,6 +18,7 @@ TEST(Trainer, CorrectionsStopBeforeAPotentialOverflows) {
   const std::size_t n_columns = problem.code->n_columns();
   std::vector<std::int32_t> weights(problem.n_units * n_columns);
   std::vector<std::int32_t> thresholds(problem.n_units);
+  // The most by which a correction moves a potential: 1 for each active column and the threshold.
   const auto reach = static_cast<std::int32_t>(problem.code->max_active()) + 1;
   for (const auto form : {TrainingForm::plain, TrainingForm::dual, TrainingForm::block}) {
     thresholds[0] = INT32_MAX - reach + 1;  // no room for a single correction

@@ -115,6 +115,7 @@ class PDeltaRule {
     std::for_each(ranked_.begin(), end, [&](const auto& ranked) { add(ranked.second); });
   }
 
+  /// The number of corrections up to which scans of the keys are faster than nth_element.
   static constexpr std::size_t kScans = 12;
 
   std::size_t n_groups_;

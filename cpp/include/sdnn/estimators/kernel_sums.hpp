@@ -58,6 +58,7 @@ struct KernelForm {
 
 namespace detail {
 
+/// Reads a register of numbers, or a single one: Real is core::Lanes or double.
 template <class Real>
 SDNN_INLINE Real loaded(const double* from) noexcept {
   if constexpr (sizeof(Real) == sizeof(double)) {
@@ -86,12 +87,13 @@ SDNN_INLINE void kernel_values_in_lanes(const SampleGroups& groups, std::size_t 
                                    SDNN_INLINE_LAMBDA { total[r] = squares[r] = Real(0.0); });
     const double* power = groups.powers + group * groups.n_geometric * 2 * kGroupSamples;
     for (std::size_t i = 0; i < groups.n_geometric; ++i, power += 2 * kGroupSamples) {
-      const Real ours(query.powers[2 * i]);
-      const Real inverse(query.powers[2 * i + 1]);
+      const Real query_power(query.powers[2 * i]);
+      const Real query_inverse(query.powers[2 * i + 1]);
       core::unrolled<kRegisters>([&](std::size_t r) SDNN_INLINE_LAMBDA {
-        const Real theirs = loaded<Real>(power + r * kSize);
-        const Real rho =
-            core::smaller(ours * loaded<Real>(power + kGroupSamples + r * kSize), inverse * theirs);
+        const Real sample_power = loaded<Real>(power + r * kSize);
+        const Real sample_inverse = loaded<Real>(power + kGroupSamples + r * kSize);
+        // The smaller of the two ratios is factor^|distance of the bins|.
+        const Real rho = core::smaller(query_power * sample_inverse, query_inverse * sample_power);
         total[r] = total[r] + rho;
         squares[r] = squares[r] + rho * rho;
       });
@@ -126,11 +128,11 @@ SDNN_INLINE double product_in_lanes(const double* a, const double* b, std::size_
       sum[r] = sum[r] + loaded<Real>(a + at + r * kSize) * loaded<Real>(b + at + r * kSize);
     });
   }
-  double each[kGroupSamples];
+  double parts[kGroupSamples];
   core::unrolled<kRegisters>([&](std::size_t r)
-                                 SDNN_INLINE_LAMBDA { stored(sum[r], each + r * kSize); });
+                                 SDNN_INLINE_LAMBDA { stored(sum[r], parts + r * kSize); });
   double result = 0.0;
-  for (const double part : each) result += part;
+  for (const double part : parts) result += part;
   return result;
 }
 
@@ -254,8 +256,8 @@ class KernelSums {
 
  private:
   static constexpr std::size_t kMostInputs = 8192;
-  static constexpr double kLeastPower = 1e-150;  // so that no product overflows
-  static constexpr std::size_t kQueriesAtOnce = 16;
+  static constexpr double kLeastPower = 1e-150;       // so that no product overflows
+  static constexpr std::size_t kQueriesAtOnce = 16;   // they share the samples in the cache
   static constexpr std::size_t kPowersAtOnce = 3072;  // they fit into the first-level cache
 
   static void check(const InputCorrelations& input) {

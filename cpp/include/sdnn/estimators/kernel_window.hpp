@@ -193,7 +193,7 @@ class KernelWindow {
     kernels(scaled, kernel);
     solve(kernel, gains);
     double factor_removed = 0.0;
-    if (replaces) {
+    if (replaces) {  // the inverse without a row and column, by its Schur complement
       const double* const inverses = inverse_.data() + slot * capacity_;
       std::copy_n(inverses, n_samples_, removed.begin());
       factor_removed = 1.0 / removed[slot];
@@ -202,15 +202,17 @@ class KernelWindow {
       gains[slot] = 0.0;
       kernel[slot] = 0.0;
     }
+    // A row and column are added by the inverse of a block matrix. `variance` is the new diagonal
+    // minus its part that the other samples explain; it is in [ridge, 1 + ridge] but for rounding.
     double variance = 1.0 + ridge_;
     for (std::size_t i = 0; i < n_samples_; ++i) variance -= kernel[i] * gains[i];
     std::ranges::copy(scaled, inputs_.begin() + static_cast<std::ptrdiff_t>(slot * n_inputs()));
     const double factor = 1.0 / variance;
     for (std::size_t row = 0; row < n_samples_; ++row) {
       double* const inverses = inverse_.data() + row * capacity_;
-      const double gain = gains[row], other = removed[row];
+      const double gain = gains[row], removed_entry = removed[row];
       for (std::size_t i = 0; i < n_samples_; ++i) {  // the order of factors keeps it symmetric
-        inverses[i] += gain * gains[i] * factor - other * removed[i] * factor_removed;
+        inverses[i] += gain * gains[i] * factor - removed_entry * removed[i] * factor_removed;
       }
     }
     if (!replaces) ++n_samples_;

@@ -67,7 +67,7 @@ class OnlineLayer {
     core::require(rule.n_units() == layer_->n_units(), "rule", "for as many units as the layer has",
                   rule.n_units());
     TrainingCount count;
-    done_.clear();
+    applied_.clear();
     struct Undoes {  // undoes the corrections unless all of them succeed
       OnlineLayer& layer;
       std::span<const std::int32_t> bins;
@@ -121,7 +121,7 @@ class OnlineLayer {
 
  private:
   /// The corrections of units in a direction, by a sample.
-  struct Done {
+  struct Applied {
     std::size_t sample;
     std::int32_t direction;
     std::vector<std::uint32_t> units;
@@ -136,23 +136,23 @@ class OnlineLayer {
   /// Corrects the units in `corrections_` by the code that was read, and records that for `undo`.
   void correct(std::size_t sample) {
     for (const std::int32_t direction : {1, -1}) {
-      Done now{sample, direction, {}};
+      Applied applied{sample, direction, {}};
       for (const Correction& correction : corrections_) {
-        if (correction.direction == direction) now.units.push_back(correction.unit);
+        if (correction.direction == direction) applied.units.push_back(correction.unit);
       }
-      if (now.units.empty()) continue;
-      std::sort(now.units.begin(), now.units.end());  // neighbours share cache lines
-      done_.reserve(done_.size() + 1);                // so that recording a correction cannot fail
-      hidden_.update(now.units, slots_.columns(), direction);
-      done_.push_back(std::move(now));
+      if (applied.units.empty()) continue;
+      std::sort(applied.units.begin(), applied.units.end());  // neighbours share cache lines
+      applied_.reserve(applied_.size() + 1);  // so that recording a correction cannot fail
+      hidden_.update(applied.units, slots_.columns(), direction);
+      applied_.push_back(std::move(applied));
     }
   }
 
   /// Takes back all recorded corrections, the last one first.
   void undo(std::span<const std::int32_t> bins) {
     const std::size_t n_inputs = layer_->code().n_inputs();
-    for (; !done_.empty(); done_.pop_back()) {
-      const Done& last = done_.back();
+    for (; !applied_.empty(); applied_.pop_back()) {
+      const Applied& last = applied_.back();
       read(bins.subspan(last.sample * n_inputs, n_inputs));
       hidden_.update(last.units, slots_.columns(), -last.direction);
     }
@@ -164,8 +164,8 @@ class OnlineLayer {
   coding::ColumnLists slots_;
   std::vector<std::int32_t> potentials_;
   std::vector<Correction> corrections_;
-  std::vector<Done> done_;  // corrections of the current call
-  bool changed_ = false;    // since the last synchronization
+  std::vector<Applied> applied_;  // corrections of the current call
+  bool changed_ = false;          // since the last synchronization
 };
 
 }  // namespace sdnn::estimators

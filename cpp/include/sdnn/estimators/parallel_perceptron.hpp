@@ -172,11 +172,11 @@ class ParallelPerceptron {
     }
     if (narrow.empty() || is_short_walk(code, bins, order)) {
       const auto sweep = [&](std::size_t begin, std::size_t end) {
-        const auto some = std::span(order).subspan(begin, end - begin);
+        const auto queries = std::span(order).subspan(begin, end - begin);
         for (std::size_t k = 0; k < layers.size(); ++k) {
           const auto answer = [&](const auto& tiles, std::size_t n_per_sum) {
             layers[k]->sweep(
-                tiles, n_per_sum, bins, some,
+                tiles, n_per_sum, bins, queries,
                 [&](std::size_t query, const std::int32_t* values) { consume(k, query, values); });
           };
           if (narrow.empty() || narrow[k]->n_chunks == 0) {
@@ -367,8 +367,8 @@ class ParallelPerceptron {
     return n_changes < kChangesPerWord * n_steps * n_words;
   }
 
-  /// The number of queries of a thread between two checks for an interruption, about a tenth of a
-  /// second.
+  /// The number of queries of a thread between two checks for an interruption, for about `n_added`
+  /// additions of a weight, which take about a tenth of a second.
   std::size_t most_at_once(std::uint64_t n_added) const noexcept {
     const std::uint64_t n_added_per_query = std::uint64_t{code_->n_slots()} * n_padded_units();
     return static_cast<std::size_t>(
@@ -379,7 +379,9 @@ class ParallelPerceptron {
   /// rethrows their exceptions.
   template <class Work>
   static void in_parts(std::size_t n_queries, std::size_t most, int n_threads, const Work& work) {
-    const auto n_parts = std::min(static_cast<std::size_t>(n_threads), (n_queries + 255) / 256);
+    constexpr std::size_t kQueriesPerThread = 256;  // fewer are not worth a thread
+    const auto n_parts = std::min(static_cast<std::size_t>(n_threads),
+                                  (n_queries + kQueriesPerThread - 1) / kQueriesPerThread);
     const std::size_t n_rounds = n_queries == 0 ? 0 : (n_queries - 1) / (most * n_parts) + 1;
     const auto begin_of = [&](std::uint64_t k) {
       return static_cast<std::size_t>(k * n_queries / (n_rounds * n_parts));
@@ -410,10 +412,10 @@ class ParallelPerceptron {
   }
 
   static constexpr std::size_t kFewQueries = 8;      // too few to narrow weights
-  static constexpr std::size_t kChangesPerWord = 4;  // from which pairs are faster
+  static constexpr std::size_t kChangesPerWord = 4;  // more make walks by pairs faster than a sweep
   static constexpr std::uint64_t kSweptAtOnce = std::uint64_t{1} << 32;
-  static constexpr std::uint64_t kAddedAtOnce = std::uint64_t{1}
-                                                << 36;  // most of these are skipped
+  /// Additions of weights in a tenth of a second; walks of pairs skip most of them.
+  static constexpr std::uint64_t kAddedAtOnce = std::uint64_t{1} << 36;
 
   std::shared_ptr<const Code> code_;
   WeightTiles<std::int32_t> weights_;

@@ -110,14 +110,14 @@ class PredictionMixture {
 
  private:
   static constexpr std::size_t kMostExperts = 1000;
-  static constexpr double kDiscount = 0.99;     ///< of a squared error, for each later sample
-  static constexpr double kPriorSamples = 5.0;  ///< with the mean error of all experts
-  static constexpr double kFewSamples = 10.0;   ///< after which errors are limited
+  static constexpr double kDiscount = 0.99;     ///< factor of a squared error per later sample
+  static constexpr double kPriorSamples = 5.0;  ///< of the mean loss, added to each expert's
+  static constexpr double kFewSamples = 10.0;  ///< discounted number after which errors are limited
   static constexpr double kLargestError = 5.0;  ///< in root mean squares
   static constexpr double kLargestLoss = 1e200;
   static constexpr double kSmallestLoss = 1e-200;
-  static constexpr int kLargestExponent = 1100;  ///< of doubles, and a few more
-  static constexpr int kMostBits = 200;          ///< of an error, in units
+  static constexpr int kLargestExponent = 1100;  ///< a double's exponent is at most 1,074 in size
+  static constexpr int kMostBits = 200;          ///< an error below 2^200 units has a finite square
 
   void require_predictions(std::span<const double> predictions) const {
     core::require_size("predictions", predictions.size(), n_experts());

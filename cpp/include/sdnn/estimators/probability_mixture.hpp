@@ -80,9 +80,11 @@ class ProbabilityMixture {
   static constexpr std::size_t kSteepnesses = 3;
   static constexpr double kSteepness = 3.0;  ///< the smallest; each other one is twice as large
   static constexpr std::size_t kMostScorers = 1000;
-  static constexpr double kDiscount = 0.99;  ///< of a logarithm, for each later sample
+  static constexpr double kDiscount = 0.99;  ///< factor of a logarithm per later sample
+  /// An estimate is at least kLeastProbability, or kLeastOfAll / n_classes if that is less, so that
+  /// no label has an infinite loss.
   static constexpr double kLeastProbability = 1e-3, kLeastOfAll = 0.1;
-  static constexpr double kLeastWeight = 1e-3;
+  static constexpr double kLeastWeight = 1e-3;  ///< so that an expert can recover after a drift
   static constexpr double kLargestLoss = 1e6;
 
   static void normalize(std::span<double> values) noexcept {

@@ -82,11 +82,11 @@ class Trainer {
         synchronize();
         renew_headroom();
       }
-      const auto some = order.first(std::min(order.size(), headroom_));
+      const auto safe = order.first(std::min(order.size(), headroom_));
       total +=
-          std::visit([&](auto& training) { return training.present(some, rule_); }, *training_);
-      headroom_ -= some.size();
-      order = order.subspan(some.size());
+          std::visit([&](auto& training) { return training.present(safe, rule_); }, *training_);
+      headroom_ -= safe.size();
+      order = order.subspan(safe.size());
     }
     return total;
   }
@@ -115,8 +115,8 @@ class Trainer {
 
   /// Makes the training of the chosen form, with the smallest integers that hold inner products.
   void make_training(std::span<const std::int32_t> bins, int n_threads, bool keeps_plans) {
-    const auto make = [&]<class Form>(std::in_place_type_t<Form> form, auto... more) {
-      training_ = std::make_unique<Training>(form, layer_, bins, n_threads, more...);
+    const auto make = [&]<class Form>(std::in_place_type_t<Form> form, auto... arguments) {
+      training_ = std::make_unique<Training>(form, layer_, bins, n_threads, arguments...);
     };
     with_product_type(layer_->code(), [&]<class Product> {
       switch (form_) {

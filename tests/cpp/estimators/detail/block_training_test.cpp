@@ -30,6 +30,7 @@ TEST(BlockTraining, HasTheBitsOfPlainTrainingOverSeveralBlocks) {
   constexpr std::size_t kSeveralBlocks = 1300;  // samples, of 512 or 256 in a block
   const auto problem = testing::in_data_order(
       testing::with_samples(testing::random_problem(12), kSeveralBlocks, 12), /*n_rounds=*/4);
+  // Limits of memory that have room for stored plans of all blocks, and for none.
   constexpr std::size_t kWithPlans = std::size_t{1} << 30, kWithoutPlans = std::size_t{3} << 20;
   for (const std::size_t limit : {kWithPlans, kWithoutPlans}) {
     const auto plain_layer = testing::layer_for(problem);
@@ -52,7 +53,7 @@ TEST(BlockTraining, HasTheBitsOfPlainTrainingOverSeveralBlocks) {
 TEST(BlockTraining, HasTheBitsOfPlainTrainingWithWeightsBeyond16Bits) {
   auto problem = testing::random_problem(5);
   const std::size_t n_columns = problem.code->n_columns();
-  // Sums of 256 weights of 127 just fit into 16 bits; those of 20,000 do not.
+  // Sums of a chunk of 256 weights of 127 just fit into 16 bits (32,512); those of 20,000 do not.
   for (const std::int32_t start : {127, 20000}) {
     std::vector<std::int32_t> weights(problem.n_units * n_columns);
     for (std::size_t i = 0; i < weights.size(); ++i) weights[i] = i % 2 == 0 ? start : -start;

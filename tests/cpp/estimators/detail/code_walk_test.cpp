@@ -21,10 +21,11 @@ using estimators::kChunkColumns;
 using estimators::kChunkWords;
 using estimators::WeightTiles;
 
+/// A code, six codes that each differ from the one before in up to 9 slots, and an unrelated code.
 std::vector<testing::Code> some_codes(std::size_t n_words, core::Random& random) {
   std::vector<testing::Code> codes{testing::random_code(n_words, random)};
   for (int k = 0; k < 6; ++k) codes.push_back(testing::neighbour_of(codes.back(), 9, random));
-  codes.push_back(testing::random_code(n_words, random));  // whose sum is begun anew
+  codes.push_back(testing::random_code(n_words, random));
   return codes;
 }
 
@@ -36,13 +37,14 @@ CodeWalk walk_through(const std::vector<testing::Code>& codes, std::size_t n_wor
   }
   CodeWalk walk;
   walk.steps.resize(codes.size());
-  walk.columns.resize(64 * n_words * codes.size() + 2);
+  walk.columns.resize(64 * n_words * codes.size() + 2);  // list_steps may write 2 more
   const auto* const end =
       estimators::list_steps(words, n_words, walk.columns.data(), walk.steps.data());
   walk.columns.resize(static_cast<std::size_t>(end - walk.columns.data()));
   return walk;
 }
 
+/// Checks sums of random weights in [-largest, largest].
 template <class Weight>
 void check_walk(std::int32_t largest) {
   core::Random random(8, core::Stream::weights);
@@ -59,7 +61,7 @@ void check_walk(std::int32_t largest) {
             static_cast<std::int32_t>(random.below(static_cast<std::uint64_t>(2 * largest + 1))) -
             largest);
       }
-      const std::size_t stride = width + 3;
+      const std::size_t stride = width + 3;  // the 3 potentials behind the width must not change
       testing::on_every_instruction_set([&](auto level) {
         const CodeWalk walk = walk_through(codes, n_words);
         std::vector<Weight> sums(codes.size() * width);
@@ -84,14 +86,14 @@ void check_walk(std::int32_t largest) {
 }
 
 TEST(CodeWalk, SumsOfStepsEqualSumsOfCodes) {
-  check_walk<std::int16_t>(63);  // sums over 256 columns of two codes just fit into 16 bits
+  check_walk<std::int16_t>(63);  // 2 codes * 256 columns * 63 < 2^15
   check_walk<std::int32_t>(1000000);
 }
 
 TEST(CodeWalk, StartsDistantCodesFromZero) {
   core::Random random(9, core::Stream::weights);
   const CodeWalk walk = walk_through(some_codes(kChunkWords, random), kChunkWords);
-  EXPECT_FALSE(walk.steps[3].from_zero);
+  EXPECT_FALSE(walk.steps[3].from_zero);  // a neighbour of the code before
   EXPECT_TRUE(walk.steps.back().from_zero);
 }
 
@@ -99,13 +101,15 @@ TEST(ChunkedWeights, AreCopiesOfTilesPaddedWithZeros) {
   WeightTiles<std::int32_t> tiles(20, 3 * 64);
   tiles.at(17, 130) = -300;
   tiles.at(17, 131) = 40000;
+  // Chunks have 4 words of 64 slots. Word 2 of the tiles has slots 128 to 191, and comes first in
+  // the second chunk; word 3 comes second in the first chunk, but the tiles have only 3 words.
   const ChunkedWeights<std::int32_t> wide(tiles, {0, 3, 1, 4, 2, 5, 6, 7});
   EXPECT_EQ(wide.n_chunks(), 2U);
-  EXPECT_EQ(wide.n_padded_units(), 32U);
-  EXPECT_EQ(wide.chunk(1, 17)[2], -300);
+  EXPECT_EQ(wide.n_padded_units(), 32U);  // 20, to a multiple of 16
+  EXPECT_EQ(wide.chunk(1, 17)[130 - 128], -300);
   EXPECT_EQ(wide.chunk(0, 17)[64], 0);
-  EXPECT_EQ(wide.largest_chunk_norm(), 40300);
-  EXPECT_EQ(ChunkedWeights<std::int32_t>::bytes(32, 4), 4U * 32 * 256);
+  EXPECT_EQ(wide.largest_chunk_norm(), 300 + 40000);
+  EXPECT_EQ(ChunkedWeights<std::int32_t>::bytes(32, 4), sizeof(std::int32_t) * 32 * 4 * 64);
 }
 
 TEST(ChunkedWeights, KeepTilesThroughConversionToNarrowWeights) {

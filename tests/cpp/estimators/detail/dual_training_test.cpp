@@ -27,14 +27,16 @@ TEST(DualTraining, HasTheBitsOfPlainTrainingInDataOrder) {
 }
 
 TEST(DualTraining, HasTheBitsOfPlainTrainingOverManyWindows) {
-  const auto problem = testing::with_samples(testing::random_problem(11), 1500, 11);
+  const auto problem =
+      testing::with_samples(testing::random_problem(11), 1500, 11);  // windows: 128
   testing::compare_with_plain(testing::in_data_order(problem, /*n_rounds=*/4),
                               estimators::TrainingForm::dual, 2,
                               [](bool same) { ASSERT_TRUE(same); });
 }
 
 TEST(DualTraining, HasTheBitsOfPlainTrainingWithCoefficientsNearOverflow) {
-  // Two samples of one code that want opposite things: one coefficient rises for ever, one falls.
+  // Two samples have one code but opposite targets, so one coefficient only rises and one only
+  // falls. Each is presented 35,000 times in each order; coefficients have 16 bits, up to 32,767.
   auto problem = testing::random_problem(3);
   const std::size_t n_inputs = problem.code->n_inputs();
   problem.bins.assign(2 * n_inputs, 0);

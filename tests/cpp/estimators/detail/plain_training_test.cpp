@@ -8,7 +8,8 @@ namespace sdnn {
 namespace {
 
 TEST(PlainTraining, ACorrectionIsAsWorkedByHand) {
-  // x_SD = +1 -1; units 0 and 1 silent at distances 3 and 1; one of them shall fire.
+  // x_SD is +1 -1. The potentials w x_SD - h are -3 and -1, so no unit fires, but one should: unit
+  // 1, the nearer, is corrected by x_SD and -1. Its potential is then 1 + 1 + 1 - 1 = 2.
   const std::vector<std::int8_t> signs{1, -1};
   const std::vector<std::int8_t> on{1, 1};
   auto code = std::make_shared<const coding::SelectiveDesensitization>(
@@ -24,8 +25,9 @@ TEST(PlainTraining, ACorrectionIsAsWorkedByHand) {
   const auto count = training.present(bins, rule);
   EXPECT_EQ(count.n_samples, 1U);
   EXPECT_EQ(count.n_units, 1U);
-  EXPECT_EQ(testing::bits_of(*layer), (std::vector<std::int32_t>{0, 0, -3, 0, 1, -1}));
-  EXPECT_EQ(training.present(bins, rule).n_samples, 0U);  // potential is 2 now: learned
+  EXPECT_EQ(testing::bits_of(*layer),
+            (std::vector<std::int32_t>{0, 0, -3, 0, 1, -1}));  // thresholds, weights
+  EXPECT_EQ(training.present(bins, rule).n_samples, 0U);       // learned
 }
 
 }  // namespace

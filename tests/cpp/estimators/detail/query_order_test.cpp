@@ -18,7 +18,7 @@ TEST(QueryOrder, TheHilbertCurveVisitsEveryPointInStepsOfOne) {
     const std::uint32_t side = 1U << n_bits;
     std::size_t n_points = 1;
     for (int i = 0; i < n_axes; ++i) n_points *= side;
-    std::vector<std::vector<std::uint32_t>> at(n_points);
+    std::vector<std::vector<std::uint32_t>> point_at(n_points);
     for (std::size_t p = 0; p < n_points; ++p) {
       std::vector<std::uint32_t> point;
       for (std::size_t rest = p, i = 0; i < static_cast<std::size_t>(n_axes); ++i, rest /= side) {
@@ -27,13 +27,14 @@ TEST(QueryOrder, TheHilbertCurveVisitsEveryPointInStepsOfOne) {
       auto axes = point;
       const auto index = static_cast<std::size_t>(estimators::detail::hilbert_index(axes, n_bits));
       ASSERT_LT(index, n_points);
-      ASSERT_TRUE(at[index].empty());
-      at[index] = point;
+      ASSERT_TRUE(point_at[index].empty());
+      point_at[index] = point;
     }
     for (std::size_t p = 1; p < n_points; ++p) {
       std::uint32_t steps = 0;
-      for (std::size_t i = 0; i < at[p].size(); ++i) {
-        steps += std::max(at[p][i], at[p - 1][i]) - std::min(at[p][i], at[p - 1][i]);
+      for (std::size_t i = 0; i < point_at[p].size(); ++i) {
+        steps += std::max(point_at[p][i], point_at[p - 1][i]) -
+                 std::min(point_at[p][i], point_at[p - 1][i]);
       }
       EXPECT_EQ(steps, 1U) << p;
     }
@@ -48,12 +49,13 @@ TEST(QueryOrder, KeepsTheOrderOfALatticeAndShortensThatOfRandomPoints) {
   core::Random random(1, core::Stream::exploration);
   std::vector<std::int32_t> scattered;
   for (int i = 0; i < 5000; ++i) scattered.push_back(static_cast<std::int32_t>(random.below(500)));
+  constexpr std::int32_t kCap = 64;  // longer steps count as this
   for (const auto& bins : {lattice, scattered}) {
     auto order = estimators::query_order(bins, 2);
     std::vector<std::uint32_t> unordered(order.size());
     std::iota(unordered.begin(), unordered.end(), 0U);
-    const auto length = [&](const std::vector<std::uint32_t>& o) {
-      return estimators::detail::walk_length(bins, 2, o, 64);
+    const auto length = [&](const std::vector<std::uint32_t>& walk) {
+      return estimators::detail::walk_length(bins, 2, walk, kCap);
     };
     const bool is_lattice = bins.size() == lattice.size();
     EXPECT_LE(length(order), is_lattice ? length(unordered) : length(unordered) / 4);
@@ -65,7 +67,7 @@ TEST(QueryOrder, KeepsTheOrderOfALatticeAndShortensThatOfRandomPoints) {
 TEST(QueryOrder, AcceptsFewQueriesAndManyInputs) {
   EXPECT_TRUE(estimators::query_order({}, 3).empty());
   core::Random random(1, core::Stream::exploration);
-  std::vector<std::int32_t> bins(100 * 80);
+  std::vector<std::int32_t> bins(100 * 80);  // more inputs than the curve's 64 bits can order
   for (auto& bin : bins) bin = static_cast<std::int32_t>(random.below(1000));
   const auto order = estimators::query_order(bins, 80);
   EXPECT_EQ(std::set<std::uint32_t>(order.begin(), order.end()).size(), 100U);

@@ -13,6 +13,7 @@
 namespace sdnn {
 namespace {
 
+/// Adds two thirds of 21 rows and subtracts the others, with entries in [-largest, largest].
 template <class To, class Entry>
 void check_sums(std::int32_t largest, std::size_t n_per_sum) {
   core::Random random(4, core::Stream::weights);
@@ -42,7 +43,7 @@ void check_sums(std::int32_t largest, std::size_t n_per_sum) {
 }
 
 TEST(SignedSums, AreExactForAllTypes) {
-  // The number of the largest entries whose sum their type holds, or 1.
+  // The second number is that of the largest entries whose sum their type still holds.
   check_sums<std::int16_t, std::int8_t>(1, 127);
   check_sums<std::int32_t, std::int8_t>(127, 1);
   check_sums<std::int32_t, std::int16_t>(4000, 8);
@@ -64,14 +65,15 @@ TEST(SignedSums, EqualPlainSumsOverRowsOfCodes) {
   const std::vector<std::size_t> words{2, 0, 1, 3};
   testing::on_every_instruction_set([&](auto level) {
     const std::size_t stride = 3 * kColumns;
-    std::vector<std::int8_t> entries(2 * stride, 7);
+    constexpr std::int8_t kUntouched = 7;
+    std::vector<std::int8_t> entries(2 * stride, kUntouched);
     estimators::expand_code(code.words(), words, kChunkWords, entries.data(), stride);
     for (std::size_t slot = 0; slot < 2 * kColumns; ++slot) {
       ASSERT_EQ(entries[slot / kColumns * stride + slot % kColumns],
                 code.at(64 * words[slot / 64] + slot % 64))
           << level;
     }
-    EXPECT_EQ(entries[kColumns], 7);
+    EXPECT_EQ(entries[kColumns], kUntouched);  // in the gap between two chunks
   });
 }
 
@@ -82,6 +84,7 @@ void check_one_row() {
     std::vector<std::int32_t> to{1000000, 2, 3, 4};
     estimators::add_row(to.data(), row.data(), 1, row.size());
     EXPECT_EQ(to, (std::vector<std::int32_t>{1000003, -2, 8, 4})) << level;
+    // Subtracted from the second entry on: -2 - 3, 8 + 4, 4 - 5.
     estimators::add_row(to.data() + 1, row.data(), -1, row.size());
     EXPECT_EQ(to, (std::vector<std::int32_t>{1000003, -5, 12, -1})) << level;
   });

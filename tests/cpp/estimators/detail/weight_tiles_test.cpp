@@ -21,11 +21,11 @@ TEST(WeightTiles, TheLastTileIsAsWideAsNeeded) {
   EXPECT_EQ(tiles.n_padded_units(), 112U);
   EXPECT_EQ(tiles.width(0), 96U);
   EXPECT_EQ(tiles.width(1), 16U);
-  tiles.at(97, 2) = -7;
-  EXPECT_EQ(tiles.tile(1)[2 * 16 + 1], -7);
+  tiles.at(97, 2) = -7;                      // the second unit of tile 1, in its third slot
+  EXPECT_EQ(tiles.tile(1)[2 * 16 + 1], -7);  // tiles store their units slot by slot
   EXPECT_EQ(tiles.tile(1), tiles.data() + std::size_t{96} * 3);
   tiles.at(95, 1) = 6;
-  EXPECT_EQ(tiles.tile(0)[96 + 95], 6);
+  EXPECT_EQ(tiles.tile(0)[1 * 96 + 95], 6);
   EXPECT_EQ(tiles.largest(), 7);
 }
 
@@ -46,9 +46,9 @@ TEST(WeightTiles, AddColumnsOfAllTiles) {
   }
   const std::vector<std::uint32_t> plus{3, 69, 3};  // one column twice
   const std::vector<std::uint32_t> minus{1};
-  std::vector<std::int32_t> sums(112, -1);
+  std::vector<std::int32_t> sums(112, -1);  // 100 units, to a multiple of 16
   tiles.add_columns({plus, minus}, 2, sums.data());
-  for (std::size_t i = 0; i < 100; ++i) {
+  for (std::size_t i = 0; i < 100; ++i) {  // three columns plus, one minus: 2 i remains
     EXPECT_EQ(sums[i], -1 + 2 * static_cast<int>(i) + 100 * (3 + 69 + 3 - 1)) << i;
   }
   EXPECT_EQ(sums[111], -1);
@@ -81,7 +81,7 @@ void check_rows(std::int32_t largest, std::size_t n_per_sum) {
 }
 
 TEST(WeightTiles, RowsAreAddedExactly) {
-  // The number of the largest weights whose sum 16 bits hold.
+  // The second number is that of the largest weights whose sum 16 bits hold: 100 * 327 < 2^15.
   check_rows<std::int16_t>(327, 100);
   check_rows<std::int16_t>(32767, 1);
   check_rows<std::int32_t>(100000, std::size_t{1} << 30);
@@ -93,6 +93,7 @@ TEST(WeightTiles, RowsTakeCoefficientsWhereTheCodeIsActive) {
     for (std::size_t i = 0; i < width; ++i) coefficients[i] = static_cast<std::int16_t>(i * 100);
     testing::on_every_instruction_set([&](auto level) {
       std::vector<std::int16_t> rows(64 * width, 1);
+      // Slots 0, 2 and 63 are active, of which slot 0 is +1. Unit i has the coefficient 100 i.
       estimators::add_outer(rows.data(), width, coefficients.data(), std::uint64_t{1} << 63 | 5, 1);
       EXPECT_EQ(rows[width - 1], 1 + 100 * static_cast<int>(width - 1)) << level;
       EXPECT_EQ(rows[2 * width + 1], 1 - 100) << level;

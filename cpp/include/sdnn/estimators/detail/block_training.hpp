@@ -72,10 +72,10 @@ class BlockTraining {
       core::interruption_point();
       const bool is_large = begins_with_a_large_block(order);
       const std::size_t size = is_large ? large_size(order.front()) : kSmallBlock;
-      const auto some = order.first(std::min(order.size(), size));
+      const auto block = order.first(std::min(order.size(), size));
       Plan plan;
-      count += present_block(some, is_large ? &plans_[block_of(order.front())] : &plan, rule);
-      order = order.subspan(some.size());
+      count += present_block(block, is_large ? &plans_[block_of(order.front())] : &plan, rule);
+      order = order.subspan(block.size());
     }
     return count;
   }
@@ -106,7 +106,8 @@ class BlockTraining {
   }
 
  private:
-  // The number of samples per pass over the weights, with and without stored plans.
+  // The number of samples per pass over the weights, with and without stored plans. A larger block
+  // needs fewer passes, but computes more products of codes for each of its samples.
   static constexpr std::size_t kLargeBlock = 512;
   static constexpr std::size_t kSmallBlock = 256;
 
@@ -131,8 +132,8 @@ class BlockTraining {
 
   /// The constant parts of a block.
   struct Plan {
-    std::vector<CodeWalk> walks;  // walks by chunk
-    std::size_t stride = 0;
+    std::vector<CodeWalk> walks;            // walks by chunk
+    std::size_t stride = 0;                 // entries between the beginnings of rows of products
     core::AlignedBuffer<Product> products;  // (size, stride), 1 added to each
   };
 
@@ -172,6 +173,7 @@ class BlockTraining {
     return count;
   }
 
+  /// The code of the b-th sample of the current block.
   coding::TernaryCode code_of(std::size_t b) const noexcept {
     const std::uint64_t* const active = words_.data() + 2 * b * n_words_;
     return {active, active + n_words_};
@@ -232,11 +234,12 @@ class BlockTraining {
     const std::size_t n_parts =
         core::round_up((n_padded + kMostUnits<Weight> - 1) / kMostUnits<Weight>, team_.size());
     const std::size_t width = core::round_up((n_padded + n_parts - 1) / n_parts, kTileStep);
-    const std::size_t fits =
+    const std::size_t n_chunks_in_sum =  // as many as a sum in Weight holds
         std::is_same_v<Weight, std::int16_t>
             ? static_cast<std::size_t>(kLargestSum / std::max<std::int64_t>(chunk_norm_, 1))
             : kMostChunks;
-    std::vector<ChunkSums<Weight>> sums(team_.size(), ChunkSums<Weight>(n_samples, fits));
+    std::vector<ChunkSums<Weight>> sums(team_.size(),
+                                        ChunkSums<Weight>(n_samples, n_chunks_in_sum));
     team_.run([&](std::size_t part) {
       for (std::size_t first = part * width; first < n_padded; first += team_.size() * width) {
         const std::size_t n = std::min(width, n_padded - first);
@@ -282,6 +285,7 @@ class BlockTraining {
     chunk_norm_ += growth;
   }
 
+  /// The number of entries, +1, 0 or -1, whose sum a byte holds.
   static constexpr std::size_t kPerByte = std::numeric_limits<std::int8_t>::max();
 
   std::shared_ptr<ParallelPerceptron> layer_;

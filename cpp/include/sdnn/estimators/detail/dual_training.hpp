@@ -69,20 +69,21 @@ class DualTraining {
   TrainingCount present(std::span<const std::int32_t> order, Rule& rule) {
     TrainingCount count;
     const bool in_data_order =
-        std::adjacent_find(order.begin(), order.end(),
-                           [](auto one, auto next) { return next != one + 1; }) == order.end();
+        std::adjacent_find(order.begin(), order.end(), [](auto sample, auto next) {
+          return next != sample + 1;
+        }) == order.end();
     // Corrections may be delayed where a window's part of their rows is contiguous.
     const std::size_t interval = in_data_order ? kFlushInterval : 1;
-    for (std::size_t waiting = 0; !order.empty(); waiting += kWindow) {
+    for (std::size_t n_since_flush = 0; !order.empty(); n_since_flush += kWindow) {
       core::interruption_point();
-      if (waiting >= interval || full_) {
+      if (n_since_flush >= interval || full_) {
         flush();
-        waiting = 0;
+        n_since_flush = 0;
       }
       if (full_) synchronize();
-      const auto now = order.first(std::min(order.size(), kWindow));
-      count += in_data_order ? present_row(now, rule) : present_some(now, rule);
-      order = order.subspan(now.size());
+      const auto window = order.first(std::min(order.size(), kWindow));
+      count += in_data_order ? present_row(window, rule) : present_some(window, rule);
+      order = order.subspan(window.size());
     }
     flush();
     return count;
@@ -179,56 +180,59 @@ class DualTraining {
 
   /// Presents samples that are contiguous in memory.
   template <class Rule>
-  TrainingCount present_row(std::span<const std::int32_t> now, Rule& rule) {
-    const auto begin = static_cast<std::size_t>(now[0]);
-    const std::size_t size = core::round_up(now.size(), PresentationWindow::kAtOnce);
+  TrainingCount present_row(std::span<const std::int32_t> samples, Rule& rule) {
+    const auto begin = static_cast<std::size_t>(samples[0]);
+    const std::size_t size = core::round_up(samples.size(), PresentationWindow::kAtOnce);
     for (std::size_t i = 0; i < layer_->n_units(); ++i) {
       std::copy_n(&potentials_[i * row_size_ + begin], size, window_.row(i));
       if (!pending_[i].empty()) add_signed(window_.row(i), size, pending_[i], begin, n_per_sum_);
     }
-    return present_window(now, &products_[begin * row_size_ + begin], row_size_, rule);
+    return present_window(samples, &products_[begin * row_size_ + begin], row_size_, rule);
   }
 
   /// Presents any samples; no correction is pending.
   template <class Rule>
-  TrainingCount present_some(std::span<const std::int32_t> now, Rule& rule) {
+  TrainingCount present_some(std::span<const std::int32_t> samples, Rule& rule) {
     for (std::size_t i = 0; i < layer_->n_units(); ++i) {
-      for (std::size_t b = 0; b < now.size(); ++b) {
-        window_.row(i)[b] = potentials_[i * row_size_ + static_cast<std::size_t>(now[b])];
+      for (std::size_t b = 0; b < samples.size(); ++b) {
+        window_.row(i)[b] = potentials_[i * row_size_ + static_cast<std::size_t>(samples[b])];
       }
     }
-    for (std::size_t b = 0; b < now.size(); ++b) {
-      const Product* const row = &products_[static_cast<std::size_t>(now[b]) * row_size_];
-      for (std::size_t e = b; e < now.size(); ++e) {
-        gathered_[b * kWindow + e] = row[static_cast<std::size_t>(now[e])];
+    for (std::size_t b = 0; b < samples.size(); ++b) {
+      const Product* const row = &products_[static_cast<std::size_t>(samples[b]) * row_size_];
+      for (std::size_t e = b; e < samples.size(); ++e) {
+        gathered_[b * kWindow + e] = row[static_cast<std::size_t>(samples[e])];
       }
     }
-    return present_window(now, gathered_.data(), kWindow, rule);
+    return present_window(samples, gathered_.data(), kWindow, rule);
   }
 
   template <class Rule>
-  TrainingCount present_window(std::span<const std::int32_t> now, const Product* products,
+  TrainingCount present_window(std::span<const std::int32_t> samples, const Product* products,
                                std::size_t stride, Rule& rule) {
-    return window_.present(now, products, stride, rule, [&](std::size_t b, Correction correction) {
-      const auto sample = static_cast<std::size_t>(now[b]);
-      pending_[correction.unit].add(&products_[sample * row_size_], correction.direction);
-      std::int16_t& coefficient =
-          coefficients_[sample * layer_->n_padded_units() + correction.unit];
-      coefficient = static_cast<std::int16_t>(coefficient + correction.direction);
-      full_ = full_ || std::abs(coefficient) >= kFullCoefficient;
-    });
+    return window_.present(
+        samples, products, stride, rule, [&](std::size_t b, Correction correction) {
+          const auto sample = static_cast<std::size_t>(samples[b]);
+          pending_[correction.unit].add(&products_[sample * row_size_], correction.direction);
+          std::int16_t& coefficient =
+              coefficients_[sample * layer_->n_padded_units() + correction.unit];
+          coefficient = static_cast<std::int16_t>(coefficient + correction.direction);
+          full_ = full_ || std::abs(coefficient) >= kFullCoefficient;
+        });
   }
 
-  /// The number of entries of a row, with room for a window from any sample.
+  /// The number of entries of a row, with room for a window from any sample: whole cache lines, of
+  /// 32 products in 16 bits.
   static constexpr std::size_t row_size_for(std::size_t n_samples) noexcept {
     return core::round_up(n_samples + PresentationWindow::kAtOnce - 1, 32);
   }
 
-  static constexpr std::size_t kWindow = 128;  // samples that are presented together
-  static constexpr std::size_t kFlushInterval = 4 * kWindow;
+  static constexpr std::size_t kWindow = 128;                 // samples that are presented together
+  static constexpr std::size_t kFlushInterval = 4 * kWindow;  // samples whose corrections may wait
+  /// A window can still change a coefficient by kWindow.
   static constexpr int kFullCoefficient = std::numeric_limits<std::int16_t>::max() - int{kWindow};
-  static constexpr std::size_t kRows = 8;
-  static constexpr std::size_t kColumns = 256;
+  static constexpr std::size_t kRows = 8;       // samples whose codes stay in the cache
+  static constexpr std::size_t kColumns = 256;  // samples whose products stay in the cache
 
   std::shared_ptr<ParallelPerceptron> layer_;
   coding::CodedSamples coded_;

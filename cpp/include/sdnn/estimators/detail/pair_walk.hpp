@@ -29,8 +29,8 @@ namespace sdnn::estimators {
 
 /// A part of a code, 1, 2 or kChunkWords words that depend on the same two inputs.
 struct PairChunk {
-  std::size_t one;
-  std::size_t other;
+  std::size_t input;
+  std::size_t other_input;
   std::vector<std::size_t> words;
   std::size_t place = 0;  ///< position of its first word among those of all chunks
 };
@@ -67,13 +67,15 @@ class PairWalks {
       : code_(code),
         inputs_(code.n_inputs()),
         order_(bins.size() / code.n_inputs()),
-        columns_(kChunkColumns * order_.size() + 2) {
-    const auto few = static_cast<std::size_t>(
+        columns_(kChunkColumns * order_.size() + 2) {  // list_steps may write 2 more
+    // With k strips of a unit square and n points the walk is about k + n / (3 k) long: along the
+    // strips and across them. It is shortest for k = sqrt(n / 3).
+    const auto n_wide_strips = static_cast<std::size_t>(
         std::max(1.0, std::round(std::sqrt(static_cast<double>(order_.size()) / 3.0))));
     for (std::size_t i = 0; i < inputs_.size(); ++i) {
       const std::size_t n_bins = code.n_bins(i);
       if (n_bins == 0) continue;
-      const std::size_t n_strips = 2 * few < n_bins ? few : n_bins;
+      const std::size_t n_strips = 2 * n_wide_strips < n_bins ? n_wide_strips : n_bins;
       Input& input = inputs_[i];
       input.begins.resize(n_strips + 1);
       std::vector<std::uint32_t> places(n_bins + 1);
@@ -97,14 +99,14 @@ class PairWalks {
 
   /// Finds the walk through the codes of all samples in a chunk.
   void find(const PairChunk& chunk, CodeWalk& walk) {
-    const Input& one = inputs_[chunk.one];
-    const Input& other = inputs_[chunk.other];
+    const Input& input = inputs_[chunk.input];
+    const Input& other = inputs_[chunk.other_input];
     walk.places.resize(order_.size());
     codes_.clear();
     std::pair last{-1, -1};
-    sort(one, other);
+    sort(input, other);
     for (const std::uint32_t sample : order_) {
-      const std::pair now{one.bins[sample], other.bins[sample]};
+      const std::pair now{input.bins[sample], other.bins[sample]};
       if (now != last) add_code(chunk, sample);
       walk.places[sample] = static_cast<std::uint16_t>(codes_.size() - 1);
       last = now;
@@ -125,11 +127,11 @@ class PairWalks {
 
   /// Orders the samples by strips of one input, and within these by the other input, upwards and
   /// downwards in turn.
-  void sort(const Input& one, const Input& other) {
-    begins_.assign(one.begins.begin(), one.begins.end() - 1);
-    ends_.assign(one.begins.begin() + 1, one.begins.end());
+  void sort(const Input& striped, const Input& other) {
+    begins_.assign(striped.begins.begin(), striped.begins.end() - 1);
+    ends_.assign(striped.begins.begin() + 1, striped.begins.end());
     for (const std::uint32_t sample : other.sorted) {
-      const std::uint32_t strip = one.strips[sample];
+      const std::uint32_t strip = striped.strips[sample];
       order_[strip % 2 == 0 ? begins_[strip]++ : --ends_[strip]] = sample;
     }
   }

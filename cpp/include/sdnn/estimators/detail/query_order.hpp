@@ -70,10 +70,11 @@ inline std::vector<std::uint32_t> query_order(std::span<const std::int32_t> bins
                                               std::size_t n_inputs) {
   constexpr std::int32_t kCap = 64;  // more distant patterns have little in common
   const std::size_t n_queries = bins.size() / n_inputs;
-  std::vector<std::uint32_t> given(n_queries);
-  std::iota(given.begin(), given.end(), std::uint32_t{0});
-  const std::uint64_t given_length = detail::walk_length(bins, n_inputs, given, kCap);
-  if (n_queries < 3 || given_length <= n_queries + n_queries / 2) return given;
+  std::vector<std::uint32_t> given_order(n_queries);
+  std::iota(given_order.begin(), given_order.end(), std::uint32_t{0});
+  const std::uint64_t given_length = detail::walk_length(bins, n_inputs, given_order, kCap);
+  // Up to 1.5 bins a step, as on a lattice, a curve would save little.
+  if (n_queries < 3 || given_length <= n_queries + n_queries / 2) return given_order;
 
   std::int32_t largest = 1;
   for (const std::int32_t bin : bins) largest = std::max(largest, bin);
@@ -86,13 +87,14 @@ inline std::vector<std::uint32_t> query_order(std::span<const std::int32_t> bins
     for (std::size_t i = 0; i < n_axes; ++i) {
       axes[i] = static_cast<std::uint32_t>(bins[q * n_inputs + i]) >> (n_bits - kept);
     }
-    keys[q] = {detail::hilbert_index(axes, kept), given[q]};
+    keys[q] = {detail::hilbert_index(axes, kept), given_order[q]};
   }
   std::sort(keys.begin(), keys.end());
-  std::vector<std::uint32_t> along(n_queries);
-  std::transform(keys.begin(), keys.end(), along.begin(),
+  std::vector<std::uint32_t> hilbert_order(n_queries);
+  std::transform(keys.begin(), keys.end(), hilbert_order.begin(),
                  [](const auto& key) { return key.second; });
-  return detail::walk_length(bins, n_inputs, along, kCap) < given_length ? along : given;
+  return detail::walk_length(bins, n_inputs, hilbert_order, kCap) < given_length ? hilbert_order
+                                                                                 : given_order;
 }
 
 }  // namespace sdnn::estimators

@@ -41,11 +41,11 @@ SDNN_INLINE std::int32_t rank_units_body(const std::int32_t* potentials, std::si
   for (; i + kSize <= size; i += kSize) {
     Vector p;
     std::memcpy(&p, potentials + i, sizeof p);
-    const Vector asked = (Vector)(p > 0) ^ flip;
+    const Vector selected = (Vector)(p > 0) ^ flip;
     Vector distance = (p ^ flip) - flip;
     const Vector near = (Vector)(distance < limits);
     distance = (distance & near) | (limits & ~near);
-    const Vector key = (((distance << n_bits) | index) & asked) | (none & ~asked);
+    const Vector key = (((distance << n_bits) | index) & selected) | (none & ~selected);
     std::memcpy(keys + i, &key, sizeof key);
     const Vector lower = (Vector)(key < lowest);
     lowest = (key & lower) | (lowest & ~lower);

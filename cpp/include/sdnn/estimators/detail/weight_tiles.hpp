@@ -18,9 +18,10 @@
 
 namespace sdnn::estimators {
 
-/// The width of a full tile: the number of units whose weights are adjacent.
+/// The width of a full tile: the number of units whose weights are adjacent. Their sums take six
+/// registers of 16-bit weights.
 inline constexpr std::size_t kTileUnits = 96;
-/// The factor of all widths of tiles.
+/// The factor of all widths of tiles: the number of 16-bit weights in a register.
 inline constexpr std::size_t kTileStep = 16;
 
 namespace detail {
