@@ -58,8 +58,8 @@ SDNNCConfig small_network() {
           .n_actions = 5};
 }
 
-// Checks the concept for every model: values and value agree, asking changes nothing, and
-// corrections move the value to the target.
+// Checks that values and value agree, that reading them changes nothing, and that corrections move
+// the value to the target of 3.
 template <ActionValue Q>
 void expect_a_model(Q model) {
   testing::WithWorkspace<Q> q(std::move(model));
@@ -82,7 +82,7 @@ TEST(ActionValue, EveryModelReadsWithoutChangeAndMovesToItsTarget) {
   expect_a_model(RBFNetwork({.n_inputs = 2, .n_actions = 5}));
 }
 
-/// Random states, some of them again and again.
+/// Random states; every third one repeats an earlier state.
 std::vector<std::array<double, 2>> some_states(std::size_t n) {
   core::Random random(3, core::Stream::sensor_noise);
   std::vector<std::array<double, 2>> states;
@@ -93,16 +93,17 @@ std::vector<std::array<double, 2>> some_states(std::size_t n) {
   return states;
 }
 
-// Workspaces that were not used for an update, or for thousands, and those of a copy.
+// Compares workspaces with new ones: `reading` is used often but not for updates, `rare` only after
+// thousands of updates, and another by a model and its copy.
 template <ActionValue Q>
 void expect_that_workspaces_follow(Q q) {
   const auto states = some_states(40);
   auto learning = q.workspace(), reading = q.workspace(), rare = q.workspace();
   std::vector<double> row(q.n_actions()), fresh(q.n_actions());
   const auto expect_fresh = [&](const Q& model, auto& workspace, const auto& state) {
-    auto new_one = model.workspace();
+    auto new_workspace = model.workspace();
     model.values(state, workspace, row);
-    model.values(state, new_one, fresh);
+    model.values(state, new_workspace, fresh);
     ASSERT_EQ(row, fresh);
   };
   for (int round = 0; round < 60; ++round) {
@@ -143,7 +144,7 @@ void expect_rates_as_defined(Q model) {
   testing::WithWorkspace<Q> whole(model), at_a_rate(model);
   std::vector<double> row(whole.n_actions()), same(whole.n_actions());
   for (int i = 0; i < 100; ++i) {
-    const std::array<double, 2> state = {0.01 * (37 * i % 100), 0.01 * i};
+    const std::array<double, 2> state = {0.01 * (37 * i % 100), 0.01 * i};  // in [0, 1)
     const std::size_t action = static_cast<std::size_t>(i) % whole.n_actions();
     const double rate = 0.1 * (1 + i % 9), target = 8.0 - 0.2 * i;
     whole.update(state, action, (1.0 - rate) * whole.value(state, action) + rate * target, 1.0);

@@ -105,7 +105,7 @@ TEST(HiddenLayer, AWeightBeyondAByteHasAHighByte) {
     ASSERT_EQ(p.weight(2, 0), i);
     ASSERT_EQ(p.weight(2, 1), -i);
     ASSERT_EQ(p.threshold(2), -i);
-    ASSERT_EQ(potentials(p, x), (std::vector<std::int32_t>{0, 0, 3 * i}));
+    ASSERT_EQ(potentials(p, x), (std::vector<std::int32_t>{0, 0, i - (-i) - (-i)}));
   }
   EXPECT_EQ(p.n_high_bytes(), 2U);
   for (int i = 500; i > 0; --i) p.update(unit, x, -1);
@@ -122,7 +122,7 @@ TEST(HiddenLayer, FewAndManyHighBytesGiveTheSameSums) {
   for (std::size_t j = 0; j < 1000; j += 3) p.set_weight(7, j, j % 2 == 0 ? 5000 : -5000);
   p.set_weight(100, 6, 200);
   p.set_weight(100, 7, -128);
-  EXPECT_EQ(p.n_high_bytes(), 334U + 2U);  // in the block of unit 7, and in that of unit 100
+  EXPECT_EQ(p.n_high_bytes(), 334U + 2U);  // columns 0, 3 to 999 of unit 7; 6 and 7 of unit 100
   Input x{.plus = {0, 3, 6, 6, 999}, .minus = {1, 7, 9}};
   const auto h = potentials(p, x);
   EXPECT_EQ(h[7], 5000 - 5000 + 2 * 5000 - 5000 + 5000);
@@ -177,7 +177,8 @@ TEST(HiddenLayer, CorrectionsEqualPlainOnesAtAnySizeOfWeights) {
   EXPECT_LT(p.n_high_bytes(), kUnits * kColumns);
 }
 
-// The bound of a weight grows with every correction, and is looked up when it gets to the limit.
+// The stored bound of a unit's weights grows with every correction; when it reaches the limit of a
+// byte it is computed anew from the weights.
 TEST(HiddenLayer, AWeightNearTheLimitOfAByteKeepsItsValueOverManyCorrections) {
   HiddenLayer p(1, 2);
   const Input x{.plus = {0}, .minus = {}};
@@ -194,6 +195,7 @@ TEST(HiddenLayer, AWeightNearTheLimitOfAByteKeepsItsValueOverManyCorrections) {
 TEST(HiddenLayer, RefusesWeightsBeyondTheLimitAndChangesNothing) {
   HiddenLayer p(2, 2);
   const Input x{.plus = {0}, .minus = {}};
+  static_assert(HiddenLayer::kWeightLimit == 16383);
   p.set_weight(1, 0, 16382);
   const std::vector<std::uint32_t> both = {0, 1};
   p.update(both, x, 1);

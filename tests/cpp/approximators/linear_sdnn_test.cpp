@@ -64,12 +64,12 @@ TEST(LinearSDNN, KeepsItsValuesWhenInputsAreAdded) {
     const auto first = static_cast<std::size_t>(n_first);
     for (int n = n_first + 1; n <= n_first + 4; n += 1 + n % 2) {
       learn_at_random(readout, 30, random);
-      LinearSDNN more(small_readout(n), kThreeAndTwo, 5, first);
-      more.continue_from(readout);
+      LinearSDNN extended(small_readout(n), kThreeAndTwo, 5, first);
+      extended.continue_from(readout);
       for (int t = 0; t < 20; ++t) {
-        Numbers state = some_state(more.n_inputs(), random);
+        Numbers state = some_state(extended.n_inputs(), random);
         for (const bool averaged : {false, true}) {
-          const Numbers values = values_of_all(more, state, averaged);
+          const Numbers values = values_of_all(extended, state, averaged);
           const Numbers before = values_of_all(
               readout, {state.begin(), state.begin() + static_cast<int>(readout.n_inputs())},
               averaged);
@@ -77,7 +77,7 @@ TEST(LinearSDNN, KeepsItsValuesWhenInputsAreAdded) {
           EXPECT_NE(std::ranges::count(values, 0.0), static_cast<int>(values.size()));
         }
       }
-      readout = more;
+      readout = extended;
     }
   }
 }

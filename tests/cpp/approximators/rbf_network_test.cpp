@@ -47,7 +47,9 @@ TEST(RBFNetwork, AGradientStepIsAsWorkedByHand) {
       {.n_inputs = 1, .n_bases = 2, .n_actions = 3, .width = 1.0, .gradient_rate = 0.5});
   EXPECT_EQ(network.n_joint_bases(), 4U);
   const std::vector<double> state = {0.5};
-  network.update(state, 0, 8.0);  // phi = (1/2, 1/2) o (p, 1 - p), p = 1 / (1 + e^-1/2)
+  // Action 0 is at the centre of the first basis of actions. The joint bases phi are products of
+  // (1/2, 1/2) and (p, 1 - p), p = 1 / (1 + e^-1/2); the step adds 0.5 * (8 - 0) * phi.
+  network.update(state, 0, 8.0);
   const double p = 1.0 / (1.0 + std::exp(-0.5));
   const std::vector<double> expected = {2.0 * p, 2.0 * (1.0 - p), 2.0 * p, 2.0 * (1.0 - p)};
   for (std::size_t j = 0; j < 4; ++j) EXPECT_NEAR(network.weights()[j], expected[j], 1e-15);

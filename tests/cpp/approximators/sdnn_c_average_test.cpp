@@ -23,22 +23,22 @@ std::vector<double> averaged_values(Network& network, const State& state) {
 }
 
 TEST(SDNNC, AveragingDoesNotChangeLearning) {
-  Network network(small(), 5), averaging_one(averaging(), 5);
+  Network network(small(), 5), averaging_network(averaging(), 5);
   core::Random random(1, core::Stream::weights);
   for (int t = 0; t < 400; ++t) {
     const State state = random_state(3, random);
     const std::size_t action = random.below(network.n_actions());
     const double target = 40.0 * random.uniform() - 20.0;
     network.update(state, action, target);
-    averaging_one.update(state, action, target);
-    if (t % 10 == 0) (void)averaged_values(averaging_one, state);
-    ASSERT_EQ(values(averaging_one, state), values(network, state)) << t;
+    averaging_network.update(state, action, target);
+    if (t % 10 == 0) (void)averaged_values(averaging_network, state);
+    ASSERT_EQ(values(averaging_network, state), values(network, state)) << t;
   }
   EXPECT_FALSE(network.has_average());
-  EXPECT_TRUE(averaging_one.has_average());
+  EXPECT_TRUE(averaging_network.has_average());
   const State state = random_state(3, random);
   EXPECT_EQ(averaged_values(network, state), values(network, state));  // as there is none
-  EXPECT_NE(averaged_values(averaging_one, state), values(network, state));
+  EXPECT_NE(averaged_values(averaging_network, state), values(network, state));
 }
 
 TEST(SDNNC, SettingParametersRestartsTheAverage) {

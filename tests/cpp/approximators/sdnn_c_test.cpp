@@ -213,13 +213,13 @@ TEST(SDNNC, CountsTheOutcomesOfCorrections) {
   };
   ASSERT_EQ(network.value(state, 0), 15.0);
   network.update(state, 0, 15.0);
-  expect_counts(0, 0, 0);  // nothing was wanted
+  expect_counts(0, 0, 0);  // the target is the value
   network.update(state, 0, 15.4);
-  expect_counts(0, 1, 0);
+  expect_counts(0, 1, 0);  // 0.4 units round to 0
   network.update(state, 0, 16.0);
-  expect_counts(1, 1, 0);
+  expect_counts(1, 1, 0);  // a unit more fires
   network.update(state, 0, 31.0);
-  expect_counts(2, 1, 1);
+  expect_counts(2, 1, 1);  // clipped to 30, and changed
 }
 
 TEST(SDNNC, RefusesAStateThatDoesNotFit) {
@@ -232,7 +232,7 @@ TEST(SDNNC, RefusesAStateThatDoesNotFit) {
                   1);
   testing::expect_that_damage_is_refused(network);
   const core::State good = core::state_of(network);
-  EXPECT_EQ(good.at("weights").shape, (std::vector<std::size_t>{12, 16}));
+  EXPECT_EQ(good.at("weights").shape, (std::vector<std::size_t>{12, 2 * 8}));  // units, columns
   const auto refused = [&](const core::State& bad, const std::string& message) {
     testing::expect_refused(network, bad, "state: " + message);
   };

@@ -43,6 +43,7 @@ TEST(SDNNC, PairsOfInputsAreAnEvenShareOfAll) {
     EXPECT_EQ(n_modified, n_modifiers);
     return n_modifiers[0];
   };
+  // floor(max_pairs / 7), but at least 1 and at most all 6; 0 means all.
   EXPECT_EQ(partners(0), 6U);
   EXPECT_EQ(partners(1), 1U);
   EXPECT_EQ(partners(20), 2U);
@@ -61,7 +62,7 @@ TEST(SDNNC, PairsOfInputsAreAnEvenShareOfAll) {
     network.update(state, random.below(network.n_actions()), 40.0 * random.uniform() - 20.0);
     ASSERT_EQ(values(network, state), values_by_masks(network, state));
   }
-  // All pairs are the paper's code, however they were asked for.
+  // The number of all pairs gives the paper's code, like the default.
   config.max_pairs = 42;
   expect_equal_parameters(Network(config, 7), Network(sizes, 7));
 }

@@ -1,4 +1,4 @@
-/// A small SDNN-C and what tests ask of it.
+/// A small SDNN-C, and functions that read and compare it.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -40,7 +40,8 @@ inline std::vector<std::int32_t> potentials(const Network& network, const State&
   return out;
 }
 
-/// Q(s, a) of every action from a full pass and window masks: nothing remembered, nothing sliding.
+/// Q(s, a) of every action from a full pass and window masks, without caches and sliding
+/// counts.
 inline std::vector<double> values_by_masks(const Network& network, const State& state) {
   using Mask = std::bitset<1024>;
   const std::vector<std::int32_t> h = potentials(network, state);

@@ -205,6 +205,7 @@ class LinearSDNN {
   /// magnitude 1e300 at most.
   int fit_unit(double number) {
     if (number == 0.0) return 0;
+    // The first number gets 31 bits: its highest bit has the exponent ilogb.
     if (!exponent_) exponent_ = std::max(std::ilogb(number) - 30, kLeastExponent);
     const std::int32_t before = *exponent_;
     while (std::abs(std::ldexp(number, -*exponent_)) >= kLargestReward) double_unit();
@@ -273,8 +274,8 @@ class LinearSDNN {
   /// error along the trace, minus rate / n times the correction along the code, where n is the
   /// number of weights that contribute to Q(s, a). Returns the number of doublings of the unit.
   int learn(const Code& code, std::span<const std::size_t> action, Trace& trace, const Step& step) {
-    const std::int64_t rate =
-        (std::int64_t{step.rate} << 12) / n_weights_of(code);  // in units of 2^-28
+    const std::int64_t rate =  // of each weight, from units of 2^-16 to units of 2^-28
+        (std::int64_t{step.rate} << 12) / n_weights_of(code);
     RowStep row_step{
         .decay = step.decay, .gain = 0, .replace = 0, .step = 0, .shift = 1, .correction = 0};
     std::int32_t gain = kTraceOne;
@@ -295,9 +296,10 @@ class LinearSDNN {
     }
     const std::int64_t along_trace = scaled(error, rate, 28);
     int n_bits = 0;
+    // The product of step (13 bits) and trace (17 bits) must fit into 32 bits.
     while (std::abs(along_trace) >> n_bits >= (1 << 13) - 1) ++n_bits;
     row_step.step = static_cast<std::int32_t>(scaled(along_trace, 1, n_bits));
-    row_step.shift = 12 - n_bits;
+    row_step.shift = 12 - n_bits;  // a trace of 1 has 12 bits of fraction
     const auto correction = static_cast<std::int32_t>(scaled(drift, rate, 28));
     std::int32_t used = 0;
     std::size_t row = 0;
@@ -370,8 +372,9 @@ class LinearSDNN {
   };
 
   static constexpr std::int32_t kLeastExponent = -1074;  // the exponent of the smallest number
-  static constexpr std::int64_t kLargestValue = std::int64_t{1} << 33;
-  static constexpr double kLargestReward = 4294967296.0;
+  static constexpr std::int64_t kLargestValue = std::int64_t{1} << 33;  // values have 33 bits
+  static constexpr double kLargestReward = 0x1p32;  // a reward has 31 bits at first, or 32 later
+  /// An error is reward + gamma Q' - Q at most: twice the largest value.
   static constexpr std::int64_t kLargestError = (std::int64_t{1} << 34) - 1;
 
   std::size_t window() const noexcept { return static_cast<std::size_t>(config_.action_window); }
@@ -384,7 +387,7 @@ class LinearSDNN {
   void sum_rows(std::size_t first, std::size_t end, bool averaged,
                 Workspace& workspace) const noexcept {
     const std::vector<std::int32_t>& weights = averaged ? averaged_ : weights_;
-    constexpr std::size_t kMost = 64;
+    constexpr std::size_t kMost = 64;  // rows at a time, so that the arrays have a fixed size
     const std::int32_t* rows[kMost];
     std::size_t places[kMost];
     std::int64_t sums[kMost];
@@ -401,6 +404,7 @@ class LinearSDNN {
     }
   }
 
+  /// Calls call(row) for each row of weights in the windows of an action, in all dimensions.
   template <class Call>
   void for_window(std::span<const std::size_t> action, const Call& call) const {
     for (std::size_t d = 0; d < n_dimensions(); ++d) {
@@ -422,7 +426,7 @@ class LinearSDNN {
     if (n_snapshots_ < kMostSnapshots) ++n_snapshots_;
   }
 
-  static constexpr std::int64_t kMostSnapshots = 3 << 10;
+  static constexpr std::int64_t kMostSnapshots = 3 << 10;  // from here on, the window is constant
 
   LinearSDNNConfig config_;
   std::shared_ptr<const coding::StateCode> code_;

@@ -63,6 +63,8 @@ inline LinearSDNNConfig with_pattern_units(LinearSDNNConfig config) noexcept {
     // The number of inputs is not checked yet, hence 64 bits.
     const std::int64_t n_partners = coding::n_partners_of(config);
     const std::int64_t n_groups = std::max<std::int64_t>(1, config.n_inputs * n_partners);
+    // Whole words of 64 units: as many as make about 3,072 columns; or 256, which are enough to
+    // keep chance correlations small, as far as these make no more than 14,336 columns.
     const std::int64_t usual = (3072 / n_groups + 32) / 64 * 64;
     const std::int64_t enough = std::min<std::int64_t>(256, 14336 / n_groups / 64 * 64);
     config.n_pattern_units =
@@ -86,6 +88,7 @@ inline double n_linear_weights(const LinearSDNNConfig& config,
 /// Throws std::length_error if `n_weights` weights, the patterns of `n_bins` bins and a trace have
 /// more bytes than config.max_table_bytes.
 inline void require_room(const LinearSDNNConfig& config, double n_bins, double n_weights) {
+  // The weights, a trace and perhaps the average of the weights.
   const double n_copies = config.averaging_interval > 0 ? 3.0 : 2.0;
   core::require_table_bytes(
       "max_pairs, n_pattern_units, n_inputs, n_actions, action_window or n_interpolated",

@@ -30,7 +30,7 @@ struct RBFNetworkConfig {
   int n_bases = 4;
   int n_actions = 601;
   double width = 0.5;          // below 0.1, gaps between the bases would be 0
-  double gradient_rate = 3.0;  // stable below 2 / |phi|^2
+  double gradient_rate = 3.0;  // a step of 0.5 * 3 is stable, as |phi|^2 <= 1 and 1.5 < 2
   std::uint64_t max_table_bytes = core::kDefaultMaxTableBytes;
 
   static constexpr auto fields() noexcept {
@@ -254,6 +254,7 @@ class RBFNetwork {
     for (Eigen::Index j = 0; j < columns.cols(); ++j) sums += state_bases[j] * columns.col(j);
   }
 
+  // Adds the product of each basis of the state and the step of the action's bases to the weights.
   template <class Step>
   void add_to_columns(const Eigen::ArrayXd& state_bases, const Step& step) {
     using Columns = Eigen::Array<double, Step::RowsAtCompileTime, Eigen::Dynamic>;

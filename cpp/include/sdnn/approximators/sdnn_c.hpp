@@ -36,7 +36,7 @@ namespace sdnn::approximators {
 
 /// The numbers of outcomes of a network's corrections.
 struct CorrectionCounts {
-  std::uint64_t asked = 0;         ///< all corrections
+  std::uint64_t asked = 0;         ///< all calls of update
   std::uint64_t changed = 0;       ///< units were corrected
   std::uint64_t rounded_away = 0;  ///< the change was smaller than half a unit
   std::uint64_t out_of_range = 0;  ///< the target was outside [q_low, q_high]
@@ -216,7 +216,7 @@ class SDNNC {
   /// Evaluates and discards some states, and touches the memory that learning may need, so that the
   /// first decision is as fast as later ones. It changes no result.
   void warm_caches(Workspace& workspace) {
-    constexpr int kStates = 8;  // each reads a third of the weights
+    constexpr int kStates = 8;  // each reads a third of the weights, so that all are read
     hidden_layer_.touch_memory();
     std::vector<double> out(n_actions());
     for (int i = 0; i < kStates; ++i) {
@@ -357,12 +357,12 @@ class SDNNC {
                double target, double rate) {
     const Cached entry = recall(state, workspace);
     const int n_firing = count_in_window(entry.potentials, action);
-    const double wanted = (1.0 - rate) * scale_(n_firing) + rate * target;
-    const int deficit = rounded_count(wanted, n_firing) - n_firing;
+    const double new_value = (1.0 - rate) * scale_(n_firing) + rate * target;
+    const int deficit = rounded_count(new_value, n_firing) - n_firing;
     const bool changes = deficit != 0 && move_count(entry, workspace, action, deficit);
     ++counts_.asked;
-    if (wanted < scale_.q_low() || wanted > scale_.q_high()) ++counts_.out_of_range;
-    if (deficit == 0 && wanted != scale_(n_firing)) ++counts_.rounded_away;
+    if (new_value < scale_.q_low() || new_value > scale_.q_high()) ++counts_.out_of_range;
+    if (deficit == 0 && new_value != scale_(n_firing)) ++counts_.rounded_away;
     if (changes) ++counts_.changed;
     const double error =
         std::abs(std::clamp(target, scale_.q_low(), scale_.q_high()) - scale_(n_firing));
@@ -400,10 +400,10 @@ class SDNNC {
     return workspace.cache_.recall(*code_, hidden_layer_, log_, workspace.bins_);
   }
 
-  /// The number of units that should fire for the value `wanted`, given that `n_firing` do.
-  int rounded_count(double wanted, int n_firing) {
-    if (config_.rounding == Rounding::half_up) return scale_.inverse(wanted);
-    const double exact = scale_.exact_inverse(wanted);
+  /// The number of units that should fire for the value `new_value`, given that `n_firing` do.
+  int rounded_count(double new_value, int n_firing) {
+    if (config_.rounding == Rounding::half_up) return scale_.inverse(new_value);
+    const double exact = scale_.exact_inverse(new_value);
     if (config_.rounding == Rounding::random) {
       return static_cast<int>(std::floor(exact + rounding_.uniform()));
     }

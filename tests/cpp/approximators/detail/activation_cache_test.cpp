@@ -10,8 +10,8 @@
 namespace sdnn::approximators {
 namespace {
 
-// A walk with small steps and jumps, with corrections of random actions in between: every way to
-// come by potentials is used, and each gives the integers of a full pass.
+// A walk with repeated states, small steps and jumps, with corrections in between: potentials are
+// found in the cache, computed from those of a neighbour, or in full, always with equal integers.
 TEST(ActivationCache, CachedPotentialsEqualThoseOfAFullPass) {
   const SDNNCConfig config{.n_pattern_units = 90, .n_hidden_units = 130, .n_active_units = 50};
   testing::WithWorkspace<SDNNC> network(config, 3);
@@ -19,7 +19,7 @@ TEST(ActivationCache, CachedPotentialsEqualThoseOfAFullPass) {
   std::vector<double> centre(4);
   std::vector<double> state(4);
   std::vector<double> values(network.n_actions());
-  std::vector<std::int32_t> potentials(130);
+  std::vector<std::int32_t> potentials(network.hidden_layer().n_units());
   for (int step = 0; step < 6000; ++step) {
     if (step % 150 == 0) {
       for (double& x : centre) x = random.uniform();
@@ -32,7 +32,8 @@ TEST(ActivationCache, CachedPotentialsEqualThoseOfAFullPass) {
     network.potentials(state, potentials);
     for (std::size_t action = 0; action < values.size(); ++action) {
       const auto first = potentials.begin() + static_cast<std::ptrdiff_t>(action);
-      const auto n_firing = std::count_if(first, first + 50, [](auto h) { return h > 0; });
+      const auto n_firing =
+          std::count_if(first, first + config.n_active_units, [](auto h) { return h > 0; });
       ASSERT_EQ(values[action], network.output_scale()(static_cast<int>(n_firing)));
     }
     if (random.below(3) != 0) {
@@ -50,8 +51,10 @@ TEST(ActivationCache, IsInvalidatedBySettingParameters) {
   testing::WithWorkspace<SDNNC> network(config, 1);
   const std::vector<double> state = {0.1, 0.2, 0.3, 0.4};
   EXPECT_EQ(network.value(state, 0), 0.0);
+  // 20 units; 4 * 3 pairs of inputs have 10 columns each. All potentials are 0 - (-1) = 1, so that
+  // all units fire, which stands for the highest value.
   network.set_parameters(std::vector<std::int32_t>(20 * 120, 0), std::vector<std::int32_t>(20, -1));
-  EXPECT_EQ(network.value(state, 0), 20.0);  // every potential is 1
+  EXPECT_EQ(network.value(state, 0), config.q_high);
 }
 
 }  // namespace

@@ -20,12 +20,13 @@ using Sums = std::array<std::int32_t, kBlockUnits>;
 struct Problem {
   core::AlignedBuffer<std::int8_t> block;
   std::vector<std::uint32_t> columns;
-  int group;
-  int factor;
+  int group;   // the number of weights whose sum fits into a byte
+  int factor;  // of the sum of all columns, which is added to `start`
   Sums start;
 };
 
-// Weights reach the ends of what the group allows; columns repeat and come in any number.
+// Weights are up to 127 / group in size; in a quarter of the problems all have that size. Columns
+// repeat, and there are many in one of twenty problems. The last column is 0 in all units.
 Problem random_problem(core::Random& random) {
   static constexpr int kGroups[] = {1, 2, 4};
   const std::size_t n_columns = 1 + random.below(40);
@@ -49,7 +50,7 @@ Problem random_problem(core::Random& random) {
   return p;
 }
 
-Sums plain(const Problem& p) {
+Sums plain_sums(const Problem& p) {
   Sums sums = p.start;
   for (const std::uint32_t column : p.columns) {
     for (std::size_t i = 0; i < kBlockUnits; ++i) {
@@ -79,14 +80,15 @@ TEST_P(EveryLevel, EqualsPlainSumsOn100000RandomProblems) {
   for (int problem = 0; problem < 100000; ++problem) {
     const Problem p = random_problem(random);
     Sums sums = p.start;
-    const std::size_t zeros = p.block.size() / kBlockUnits - 1;
+    const std::size_t zeros =  // the column that fills incomplete groups
+        p.block.size() / kBlockUnits - 1;
     std::span<const std::uint32_t> columns = p.columns;
     do {
-      const auto some = columns.first(std::min(ColumnPlaces::kMost, columns.size()));
-      columns = columns.subspan(some.size());
-      add_columns(p.block.data(), ColumnPlaces(some, zeros), p.group, p.factor, sums.data());
+      const auto part = columns.first(std::min(ColumnPlaces::kMost, columns.size()));
+      columns = columns.subspan(part.size());
+      add_columns(p.block.data(), ColumnPlaces(part, zeros), p.group, p.factor, sums.data());
     } while (!columns.empty());
-    ASSERT_EQ(sums, plain(p)) << "problem " << problem;
+    ASSERT_EQ(sums, plain_sums(p)) << "problem " << problem;
   }
 }
 

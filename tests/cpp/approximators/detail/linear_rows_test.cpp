@@ -18,6 +18,7 @@ struct Rows {
   std::vector<std::int8_t> signs;
 };
 
+/// Rows of random weights of 24 bits, traces in their range, and signs of which half are 0.
 Rows random_rows(std::size_t n, std::uint64_t seed) {
   core::Random random(seed, core::Stream::weights);
   Rows rows;
@@ -49,6 +50,7 @@ TEST(LinearRows, SumsOfTheLargestWeightsAreExactOnEveryInstructionSet) {
 }
 
 TEST(LinearRows, SignsAreThoseOfTheActiveColumns) {
+  // Slots 0, 1 and 3 and all of the second word are active; a positive bit alone has no effect.
   const std::uint64_t active[] = {0b1011, ~std::uint64_t{0}};
   const std::uint64_t positive[] = {0b0110, std::uint64_t{1} << 63};
   std::vector<std::int8_t> expected(128, -1);
@@ -57,7 +59,7 @@ TEST(LinearRows, SignsAreThoseOfTheActiveColumns) {
   expected[2] = 0;
   expected[127] = 1;
   testing::on_every_instruction_set([&](auto) {
-    std::vector<std::int8_t> signs(128, 5);
+    std::vector<std::int8_t> signs(128, 5);  // all to be overwritten
     spread_signs(active, positive, 2, signs.data());
     EXPECT_EQ(signs, expected);
   });
@@ -83,7 +85,8 @@ TEST(LinearRows, SumsOfManyRowsEqualThoseOfSingleRows) {
 }
 
 TEST(LinearRows, AStepOfTracesAndWeightsIsAsWorkedByHand) {
-  // Traces are halved towards 0 and increased by the code +1, -1, 0, where 4096 is kTraceOne.
+  // Traces are halved towards 0 and increased by the code +1, -1, 0, where 4096 is kTraceOne:
+  // 1 + 4096, -1 - 4096, 2048 + 0.
   std::vector<std::int32_t> weights{100, 100, 100}, traces{3, -3, 4096};
   const std::vector<std::int8_t> signs{1, -1, 0};
   const RowStep step{.decay = kDecayOne / 2,
@@ -96,7 +99,7 @@ TEST(LinearRows, AStepOfTracesAndWeightsIsAsWorkedByHand) {
   EXPECT_EQ(traces, (std::vector<std::int32_t>{4097, -4097, 2048}));
   // 100 + round(5 * 4097 / 4096) - 2; 100 + round(-5.001) + 2; 100 + round(2.5), halves up
   EXPECT_EQ(weights, (std::vector<std::int32_t>{103, 97, 103}));
-  EXPECT_EQ(use.weights, 103 | 97);
+  EXPECT_EQ(use.weights, 103 | 97);  // the bits that any weight uses
   EXPECT_NE(use.traces, 0);
 }
 

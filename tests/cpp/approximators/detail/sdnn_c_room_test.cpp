@@ -40,7 +40,7 @@ TEST(Wiring, HasOneTablePerInput) {
 TEST(Wiring, HasAsManyStridesAsPartners) {
   SDNNCConfig config = five_inputs();
   EXPECT_EQ(strides_of(config, 1), (std::vector<std::size_t>{1, 2, 3, 4}));
-  config.max_pairs = 14;  // 2 of 4 for each of 5 inputs
+  config.max_pairs = 14;  // floor(14 / 5) = 2 of 4 partners for each of 5 inputs
   bool differ = false;
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     const auto strides = strides_of(config, seed);

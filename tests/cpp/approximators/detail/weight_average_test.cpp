@@ -49,17 +49,18 @@ TEST(WeightAverage, AveragesWeightsOfAnySize) {
     WeightAverage average(layer, 1);
     average.note(1, layer);
     const std::int32_t unit_weight = 1 << average.fraction_bits();
-    EXPECT_LE(std::abs(weight) * unit_weight, 32767);
-    EXPECT_GT(std::abs(weight) * unit_weight, 16000);
+    EXPECT_LE(std::abs(weight) * unit_weight, 32767);  // 15 bits and a sign
+    EXPECT_GT(std::abs(weight) * unit_weight, 16000);  // with another fraction bit it would not fit
     EXPECT_EQ(average.weight(69, 1), weight * unit_weight);
     EXPECT_EQ(average.weight(3, 1), -weight * unit_weight);
     layer.set_weight(69, 1, -weight);
     for (std::uint64_t n = 2; n < 4000; ++n) average.note(n, layer);
-    EXPECT_NEAR(average.weight(69, 1), -weight * unit_weight, 4) << weight;  // moved by eighths
+    EXPECT_NEAR(average.weight(69, 1), -weight * unit_weight, 4)
+        << weight;  // steps of an eighth round to 0
   }
 }
 
-// A weight that swings for ever, half of the time up: its average comes to rest in the middle.
+// A weight that alternates between 100 and -100, 700 corrections each: its average is near 0.
 TEST(WeightAverage, AnOscillatingWeightAveragesToItsMiddle) {
   HiddenLayer layer(1, 1);
   WeightAverage average(layer, 10);
@@ -68,7 +69,8 @@ TEST(WeightAverage, AnOscillatingWeightAveragesToItsMiddle) {
     average.note(n, layer);
   }
   EXPECT_LT(std::abs(steps_of(average, 0, 0)), 20);
-  EXPECT_LT(average.n_snapshots(), 64U + 64U * 4U);  // ever rarer: 64 log(20000 / 640) and 64
+  EXPECT_LT(average.n_snapshots(),
+            64U + 64U * 4U);  // every 10 until 640, then every n / 64: 64 ln(20000 / 640)
 }
 
 TEST(WeightAverage, ForgetRestartsTheAverage) {

@@ -28,6 +28,7 @@ namespace sdnn::approximators {
 /// layer can thus be checked, and updated by the later corrections.
 class CorrectionLog {
  public:
+  /// Cached potentials that miss more corrections are computed anew, which is then faster.
   static constexpr std::size_t kSize = 512;
 
   /// A correction: w_i += step * x_SD(bins) and w_i0 -= step for every i in `units`.
@@ -47,7 +48,7 @@ class CorrectionLog {
         units_(kSize * max_units),
         sizes_(kSize) {}
 
-  /// The number of bytes that grow with this size.
+  /// The bytes for the units of corrections, the largest part of a log.
   static constexpr std::size_t n_bytes(std::size_t max_units) noexcept {
     return kSize * max_units * sizeof(std::uint32_t);
   }
@@ -153,10 +154,11 @@ class ActivationCache {
         to_(code),
         changes_(code.column_lists()),
         listed_{Listed(code), Listed(code)} {
-    // A unit of a modifier switches the k inputs that it modifies; as half of the modifiers are
-    // active, these are about k / 2 columns. Neighbouring bins differ in `differing` units of each
-    // pattern (about m / 2 / 45). In each of the k groups where the pattern is modified, half of
-    // these units are active and change two columns, or a single column twice.
+    // Costs are estimated in columns, for an input with k partners. Neighbouring bins differ in
+    // `differing` units of a pattern, measured over ten bins: about m / 2 / 45, because half of the
+    // m units differ between two anchors that are 45 bins apart. Where the pattern is modified, in
+    // k groups, half of these units are active and change two columns. Where it is the modifier, a
+    // unit switches a unit in each of k groups, which are k / 2 columns of the paired code.
     const double l = static_cast<double>(code.n_inputs());
     const coding::PatternTable& table = code.table(0);
     const double differing = static_cast<double>(table[0].distance(
@@ -165,14 +167,15 @@ class ActivationCache {
     const double n_partners = static_cast<double>(code.n_partners());
     const std::size_t half_of_partners = (code.n_partners() + 1) / 2;
     const double columns_of_modifier = static_cast<double>(half_of_partners);
-    columns_per_bin_ = (n_partners + columns_of_modifier) * std::max(differing, 0.05);
-    columns_per_correction_ = 0.15 * l * n_partners;
+    columns_per_bin_ = (n_partners + columns_of_modifier) * std::max(differing, 0.05);  // not 0
+    constexpr double kColumnsPerProduct = 0.15;  // time of a group's inner product, as measured
+    columns_per_correction_ = kColumnsPerProduct * l * n_partners;
     columns_of_pass_ = 0.5 * l * static_cast<double>(code.n_pattern_units()) * columns_of_modifier;
     too_far_ = static_cast<std::int32_t>(
         std::min(std::ceil(columns_of_pass_ / columns_per_bin_), double{INT32_MAX}));
   }
 
-  /// The number of bytes that grow with this size.
+  /// The bytes for potentials, the largest part of a cache.
   static constexpr std::size_t n_bytes(std::size_t n_units) noexcept {
     return kEntries * n_units * sizeof(std::int32_t);
   }
@@ -327,7 +330,7 @@ class ActivationCache {
   double columns_per_bin_;
   double columns_per_correction_;
   double columns_of_pass_;
-  std::int32_t too_far_;  ///< bins
+  std::int32_t too_far_;  ///< distance in bins from which a full pass is cheaper
   Counts counts_;
 };
 

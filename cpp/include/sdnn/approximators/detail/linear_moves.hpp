@@ -26,12 +26,13 @@ inline void LinearSDNN::shrink_weights(std::int32_t used) noexcept {
 inline int LinearSDNN::move_rows(const Code& code, std::span<const std::int64_t> errors,
                                  std::int32_t rate) {
   assert(errors.size() == n_rows());
-  const std::int64_t part = (std::int64_t{rate} << 12) / n_weights_of(code);  // in units of 2^-28
+  // The rate of each weight, from units of 2^-16 to units of 2^-28.
+  const std::int64_t rate_per_weight = (std::int64_t{rate} << 12) / n_weights_of(code);
   const std::int32_t exponent = exponent_.value_or(0);
   std::vector<std::int64_t> steps(errors.begin(), errors.end());
   std::int64_t largest = 0;
   for (std::int64_t& step : steps) {
-    step = scaled(std::clamp(step, -kLargestError, kLargestError), part, 28);
+    step = scaled(std::clamp(step, -kLargestError, kLargestError), rate_per_weight, 28);
     largest = std::max(largest, std::abs(step));
   }
   for (; largest >= kLargestWeight; largest = halved(largest)) {

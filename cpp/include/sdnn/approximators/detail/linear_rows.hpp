@@ -31,7 +31,8 @@ struct RowUse {
   std::int32_t weights = 0;
 };
 
-/// The largest magnitude of traces, 32 times the 1 of a code.
+/// Traces count units of 2^-12 and are below 32 in size; factors of traces count units of 2^-13. So
+/// a product of a trace and a factor, or a step, has at most 17 + 13 bits.
 inline constexpr std::int32_t kTraceOne = 1 << 12;
 inline constexpr std::int32_t kLargestTrace = (1 << 17) - 1;
 inline constexpr std::int32_t kDecayOne = 1 << 13;
@@ -47,11 +48,11 @@ constexpr Number halved(Number units) noexcept {
   return (units + 1) >> 1;
 }
 
-/// Weights are below 2^23 in size.
+/// Weights are below 2^23 in size, so that the sum of 256 of them fits into 32 bits.
 inline constexpr int kWeightBits = 23;
 inline constexpr std::int32_t kLargestWeight = 1 << kWeightBits;
 
-/// The bits of the magnitude of a weight.
+/// The magnitude of a weight, less 1 for negative weights; its highest bit shows the bits needed.
 constexpr std::uint32_t size_bits(std::int32_t weight) noexcept {
   return static_cast<std::uint32_t>(weight ^ (weight >> 31));
 }
@@ -67,7 +68,7 @@ namespace detail {
 template <std::size_t kRows>
 SDNN_INLINE void sum_rows_at_once(const std::int32_t* const* rows, const std::int8_t* signs,
                                   std::size_t n_columns, std::int64_t* sums) noexcept {
-  constexpr std::size_t kBlock = 256;  // columns whose sum fits into 32 bits
+  constexpr std::size_t kBlock = 256;  // columns whose sum of weights fits into 32 bits
   std::fill_n(sums, kRows, 0);
   for (std::size_t first = 0; first < n_columns; first += kBlock) {
     const std::size_t last = std::min(n_columns, first + kBlock);
@@ -89,6 +90,8 @@ SDNN_INLINE void row_sums_body(const std::int32_t* const* rows, std::size_t n_ro
   if (i < n_rows) sum_rows_at_once<1>(rows + i, signs, n_columns, sums + i);
 }
 
+/// Decays and increases the traces, and adds their multiples to the weights; with kCorrects, also
+/// subtracts the correction. Integers have the signs of two's complement: x >> 31 is -1 or 0.
 template <bool kCorrects>
 SDNN_INLINE RowUse learn_columns(std::int32_t* weights, std::int32_t* traces,
                                  const std::int8_t* signs, std::size_t n_columns,
@@ -163,7 +166,7 @@ class LinearCode {
  public:
   /// Columns that are not 0.
   std::int32_t n_active() const noexcept { return n_active_; }
-  /// -1, 0 or +1 for each column.
+  /// The code: -1, 0 or +1 for each column.
   const std::vector<std::int8_t>& signs() const noexcept { return signs_; }
 
  private:
@@ -189,7 +192,8 @@ class LinearWorkspace {
   std::vector<std::int64_t> sums_;       ///< sums of the actions of a dimension
 };
 
-/// The traces of a stream of experience: the weights that contributed to earlier values.
+/// Eligibility traces of the weights in a stream of experience: how much each weight contributed to
+/// earlier values.
 class LinearTrace {
  public:
   /// Begins with zeros.

@@ -18,7 +18,8 @@ namespace sdnn::approximators {
 
 using PairedColumns = coding::StateCode::PairedColumns;
 
-/// The weight of a hidden unit for the unit of x_SD that has these columns.
+/// The weight of a hidden unit for a unit of x_SD. The paired code has columns for the sum and the
+/// difference of two units of x_SD instead of the units; the weight is half the sum of theirs.
 inline std::int32_t paired_weight(const HiddenLayer& layer, std::size_t unit,
                                   const PairedColumns& columns) noexcept {
   const std::int32_t first = layer.weight(unit, columns.first);

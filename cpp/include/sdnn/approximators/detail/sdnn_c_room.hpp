@@ -23,6 +23,7 @@ inline void require_room(const SDNNCConfig& config, double n_bins) {
   const double n_units = static_cast<double>(sizes.n_hidden_units());
   const double n_partners = coding::n_partners_of(config);
   const double n_columns = l * n_partners * config.n_pattern_units;
+  // Two bytes for each weight, and four for each column.
   double weights = 2.0 * n_units * n_columns + 4.0 * n_columns;
   if (config.averaging_interval > 0) {  // the average, its layer and its cache
     weights += WeightAverage::n_bytes(n_units, n_columns) + 2.0 * n_units * n_columns;

@@ -88,7 +88,8 @@ std::vector<coding::PatternTable> code_books_with_missing(const Config& config,
   return with_missing_patterns(config, code_books_of(config, seed), config.n_symbols, seed);
 }
 
-/// Draws the strides of the code, in ascending order.
+/// Draws the strides of the code, in ascending order: input mu is paired with the inputs mu +
+/// stride in the circle of inputs.
 template <class Config>
 std::vector<std::size_t> strides_of(const Config& config, std::uint64_t seed) {
   core::Random random(seed, core::Stream::pairs);
@@ -152,6 +153,7 @@ inline void copy_to_more_inputs(const coding::StateCode& fewer, std::span<const 
                                 const coding::StateCode& more, std::span<std::int32_t> to) {
   const std::size_t n_columns = 64 * more.n_words() / more.n_groups();
   const std::size_t n_from = 64 * fewer.n_words(), n_to = 64 * more.n_words();
+  // The groups of each modifier that are in pairs: the even part of its number of groups.
   const std::size_t n_before = fewer.n_partners(), n_now = more.n_partners();
   const std::size_t paired_before = n_before / 2 * 2, paired_now = n_now / 2 * 2;
   for (std::size_t row = 0; row < to.size() / n_to; ++row) {

@@ -1,4 +1,4 @@
-/// Columns that tell the size of each input by itself, beside the code of pairs of inputs.
+/// Columns that encode the size of each input by itself, beside the code of pairs of inputs.
 #pragma once
 
 #include <algorithm>
@@ -44,6 +44,7 @@ class Thermometers {
       signs = std::fill_n(signs, n_units_, 0);
       if (bins[i] >= n_bins) continue;
       const coding::Bin last = std::max(n_bins - 1, 1);
+      // The number of units above: n_units * bin / last, rounded to the nearest integer.
       const std::int64_t twice_above = std::int64_t{2} * bins[i] * n_units_ + last;
       const auto n_above = static_cast<coding::Bin>(twice_above / (std::int64_t{2} * last));
       std::fill_n(signs - n_units_, n_above, 1);

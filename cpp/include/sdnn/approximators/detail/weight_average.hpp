@@ -31,7 +31,7 @@ namespace sdnn::approximators {
 /// 4 (polynomial-decay averaging, with eta about 7).
 class WeightAverage {
  public:
-  static constexpr int kFractionBits = 14;
+  static constexpr int kFractionBits = 14;  ///< of small weights, in the 15 bits beside the sign
 
   WeightAverage(const HiddenLayer& layer, int interval)
       : n_units_(layer.n_units()),
@@ -42,7 +42,7 @@ class WeightAverage {
         thresholds_(n_units_) {}
 
   static constexpr double n_bytes(double n_units, double n_columns) noexcept {
-    return n_units * (2.0 * n_columns + 8.0);
+    return n_units * (sizeof(std::int16_t) * n_columns + sizeof(std::int64_t));
   }
 
   /// The number of snapshots in the average; 0 before the first one.
@@ -102,7 +102,7 @@ class WeightAverage {
   }
 
  private:
-  static constexpr int kLogSnapshots = 6;
+  static constexpr int kLogSnapshots = 6;        // late snapshots are n / 2^6 corrections apart
   static constexpr int kFewestFractionBits = 1;  // every weight fits with these
   static_assert(HiddenLayer::kWeightLimit << kFewestFractionBits <= INT16_MAX);
   static constexpr std::int64_t kLargestThreshold = std::int64_t{1} << (30 + kFractionBits);
@@ -111,8 +111,9 @@ class WeightAverage {
   int shift_at(std::uint64_t n_corrections) const noexcept {
     if (n_snapshots_ == 0) return 0;
     const std::uint64_t passed = std::max(interval_, n_corrections >> kLogSnapshots);
+    // The share of 8 * passed / n is 2^-shift: bit_width is the logarithm plus 1, and 8 is 2^3.
     // Older libraries return another type, hence the cast.
-    return std::max(static_cast<int>(std::bit_width(n_corrections / passed)) - 4, 0);
+    return std::max(static_cast<int>(std::bit_width(n_corrections / passed)) - 1 - 3, 0);
   }
 
   /// Moves the average towards the layer's present weights and thresholds, by a share of 2^-shift.
@@ -127,8 +128,8 @@ class WeightAverage {
       }
     }
     for (std::size_t unit = 0; unit < n_units_; ++unit) {
-      const std::int64_t now = std::int64_t{layer.threshold(unit)} << kFractionBits;
-      thresholds_[unit] += (now - thresholds_[unit] + half) >> shift;
+      const std::int64_t threshold = std::int64_t{layer.threshold(unit)} << kFractionBits;
+      thresholds_[unit] += (threshold - thresholds_[unit] + half) >> shift;
     }
     ++n_snapshots_;
   }
@@ -142,7 +143,7 @@ class WeightAverage {
     for (std::size_t i = 0; i < moved.size(); ++i) {
       const std::int32_t before = average[i];
       moved[i] = before + (((weights[i] << fraction_bits_) - before + half) >> shift);
-      excess |= moved[i] ^ static_cast<std::int16_t>(moved[i]);
+      excess |= moved[i] ^ static_cast<std::int16_t>(moved[i]);  // not 0 beyond 16 bits
     }
     if (excess != 0) return false;
     for (std::size_t i = 0; i < moved.size(); ++i) {

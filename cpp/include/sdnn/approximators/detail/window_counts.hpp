@@ -17,11 +17,13 @@ namespace sdnn::approximators {
 
 namespace detail {
 
-/// The body of count_windows. Multiplying eight bytes of 0 and 1 by 0x01...01 gives their prefix
-/// sums. The bytes are __restrict, because compilers vectorize the loops only without aliasing.
+/// The body of count_windows: counts of firing units before each unit, whose differences are the
+/// windows' counts. Units are counted in groups of eight bytes of 0 and 1: multiplied by 0x01...01,
+/// they become their prefix sums, the last of which is the highest byte. The bytes are __restrict,
+/// because compilers vectorize the loops only without aliasing.
 SDNN_INLINE std::int32_t count_windows_body(std::span<const std::int32_t> potentials,
                                             std::size_t size, std::uint8_t* __restrict firing,
-                                            std::int32_t* __restrict of_groups,
+                                            std::int32_t* __restrict before_groups,
                                             std::int32_t* __restrict before,
                                             std::int32_t* __restrict counts) noexcept {
   const std::size_t n = potentials.size();
@@ -32,13 +34,13 @@ SDNN_INLINE std::int32_t count_windows_body(std::span<const std::int32_t> potent
     std::memcpy(&bytes, firing + 8 * group, sizeof bytes);
     bytes *= 0x0101010101010101U;
     std::memcpy(firing + 8 * group, &bytes, sizeof bytes);
-    of_groups[group] = n_firing;
+    before_groups[group] = n_firing;
     n_firing += static_cast<std::int32_t>(bytes >> 56);
   }
   before[0] = 0;
   for (std::size_t group = 0; group < n / 8; ++group) {
     for (std::size_t k = 0; k < 8; ++k) {
-      before[8 * group + k + 1] = of_groups[group] + firing[8 * group + k];
+      before[8 * group + k + 1] = before_groups[group] + firing[8 * group + k];
     }
   }
   for (std::size_t i = n - n % 8; i < n; ++i) before[i + 1] = n_firing += firing[i];
@@ -53,19 +55,19 @@ SDNN_INLINE std::int32_t count_windows_body(std::span<const std::int32_t> potent
 }  // namespace detail
 
 /// Counts the units that fire in every window of `size` units; returns the largest count. Shapes:
-/// potentials (n,), counts (n - size + 1,); scratch: firing (n,), of_groups (n / 8,), before (n +
-/// 1,).
+/// potentials (n,), counts (n - size + 1,); scratch: firing (n,), before_groups (n / 8,), before (n
+/// + 1,).
 SDNN_KERNEL(std::int32_t, count_windows,
             (std::span<const std::int32_t> potentials, std::size_t size, std::uint8_t* firing,
-             std::int32_t* of_groups, std::int32_t* before, std::int32_t* counts),
-            (potentials, size, firing, of_groups, before, counts))
+             std::int32_t* before_groups, std::int32_t* before, std::int32_t* counts),
+            (potentials, size, firing, before_groups, before, counts))
 
 /// The counts of the actions of a code, and buffers to compute them.
 class WindowCounts {
  public:
   explicit WindowCounts(const coding::ActionCode& actions)
       : firing_(actions.n_hidden_units()),
-        of_groups_(actions.n_hidden_units() / 8),
+        before_groups_(actions.n_hidden_units() / 8),
         before_(actions.n_hidden_units() + 1),
         of_windows_(actions.n_hidden_units() - actions.n_active_units() + 1),
         of_actions_(actions.n_actions() < of_windows_.size() ? actions.n_actions() : 0) {}
@@ -74,7 +76,7 @@ class WindowCounts {
   void count(std::span<const std::int32_t> potentials, const coding::ActionCode& actions) {
     assert(potentials.size() == firing_.size());
     largest_ = count_windows(potentials, actions.n_active_units(), firing_.data(),
-                             of_groups_.data(), before_.data(), of_windows_.data());
+                             before_groups_.data(), before_.data(), of_windows_.data());
     if (of_actions_.empty()) return;
     for (std::size_t action = 0; action < of_actions_.size(); ++action) {
       of_actions_[action] = of_windows_[actions.first_unit(action)];
@@ -102,7 +104,7 @@ class WindowCounts {
 
  private:
   std::vector<std::uint8_t> firing_;
-  std::vector<std::int32_t> of_groups_;
+  std::vector<std::int32_t> before_groups_;
   std::vector<std::int32_t> before_;
   std::vector<std::int32_t> of_windows_;
   std::vector<std::int32_t> of_actions_;  ///< empty if every window has an action
