@@ -23,7 +23,7 @@ TEST(ActionMask, IsSplitIntoPartsOfDimensions) {
   EXPECT_TRUE(allows(all, 2));
 }
 
-TEST(ActionMask, DrawsEachAllowedAction) {
+TEST(ActionMask, DrawsEachAllowedAction) {  // actions 1, 3, 4 and 6, of which draw(n) picks one
   std::vector<std::size_t> drawn;
   for (std::size_t k = 0; k < 4; ++k) {
     drawn.push_back(draw_allowed(kMask, kMask.size(), [k](std::size_t n) {
@@ -32,7 +32,7 @@ TEST(ActionMask, DrawsEachAllowedAction) {
     }));
   }
   EXPECT_EQ(drawn, (std::vector<std::size_t>{1, 3, 4, 6}));
-  EXPECT_EQ(draw_allowed({}, 9, [](std::size_t n) { return n - 1; }), 8U);
+  EXPECT_EQ(draw_allowed({}, 9, [](std::size_t n) { return n - 1; }), 8U);  // without a mask
 }
 
 TEST(ActionMask, SetsValuesOfForbiddenActionsToMinusInfinity) {

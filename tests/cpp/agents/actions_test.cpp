@@ -33,8 +33,9 @@ TEST(Actions, OfABoxAreEvenlySpacedAndFoundByTheNearestIndex) {
 
 TEST(Actions, AnOffsetMovesActionsOfABoxButNotDiscreteOnes) {
   const Actions actions({.low = {-2.0}, .high = {2.0}}, 5);
-  EXPECT_EQ(actions.beside_index(1, 0.25, 0), -0.75);
-  EXPECT_EQ(actions.beside_index(4, -0.5, 0), 1.5);
+  // The actions -2, -1, 0, 1, 2; an offset is a share of their distance.
+  EXPECT_EQ(actions.beside_index(1, 0.25, 0), -1.0 + 0.25);
+  EXPECT_EQ(actions.beside_index(4, -0.5, 0), 2.0 - 0.5);
   EXPECT_EQ(Actions({.low = {-2.0}, .high = {2.0}}, 1).beside_index(0, 0.0, 0), -2.0);
   const Actions discrete({.low = {3.0}, .high = {7.0}, .discrete = true}, 5);
   EXPECT_EQ(discrete.beside_index(1, 0.25, 0), 4.0);
@@ -43,7 +44,7 @@ TEST(Actions, AnOffsetMovesActionsOfABoxButNotDiscreteOnes) {
 TEST(Actions, OfANormalizedNumberAreScaledToTheRangeAndRoundedToIntegers) {
   const Actions actions({.low = {-2.0, 0.0}, .high = {6.0, 1.0}}, 0);
   EXPECT_EQ(actions.of_normalized(-1.0, 0), -2.0);
-  EXPECT_EQ(actions.of_normalized(-0.5, 0), 0.0);
+  EXPECT_EQ(actions.of_normalized(-0.5, 0), 0.0);  // a quarter of the way from -2 to 6
   EXPECT_EQ(actions.of_normalized(1.0, 0), 6.0);
   EXPECT_EQ(actions.of_normalized(-0.5, 1), 0.25);
   const Actions bytes({.low = {0.0}, .high = {255.0}, .number = ActionNumber::whole}, 0);

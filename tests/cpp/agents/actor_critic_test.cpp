@@ -33,13 +33,13 @@ std::vector<double> probabilities(const ActorCritic& agent, const State& state) 
   return {values.begin(), values.end()};
 }
 
-/// Steps of random states, with rewards for the last action.
+/// Learns steps between random states, with a reward of 1 for the last of three actions.
 void learn_at_random(ActorCritic& agent, int n_steps, std::uint64_t seed) {
   core::Random random(seed, core::Stream::useless_inputs);
   State state{random.uniform(), random.uniform()};
   for (int step = 0; step < n_steps; ++step) {
-    const auto taken = agent.act(state);
-    const Indices action(taken.begin(), taken.end());
+    const auto selected = agent.act(state);
+    const Indices action(selected.begin(), selected.end());
     const State next{random.uniform(), random.uniform()};
     const bool terminated = random.below(10) == 0;
     agent.learn(state, action, action.front() == 2 ? 1.0 : 0.0, next, terminated);
@@ -48,7 +48,7 @@ void learn_at_random(ActorCritic& agent, int n_steps, std::uint64_t seed) {
   }
 }
 
-// A critic with alpha = 1 and no trace has the reward of a terminal transition at once.
+// With alpha = 1 and no trace, a critic's value is its target after a single transition.
 TEST(ActorCritic, WithRateOneTheCriticLearnsRewardPlusDiscountedValue) {
   ActorCritic agent = actor_critic_of(
       {.learning_rate = 1.0, .discount = 0.5, .trace_decay = 0.0, .final_learning_rate = {}});

@@ -18,7 +18,7 @@ namespace {
 using nlohmann::json;
 using Numbers = std::vector<double>;
 
-constexpr std::uint64_t kSeed = 18446744073709551615U;  // the largest there is
+constexpr std::uint64_t kSeed = 18446744073709551615U;  // the largest seed, 2^64 - 1
 
 ControllerConfig small_sdnn() {
   return {.approximator = approximators::SDNNCConfig{.n_pattern_units = 16,
@@ -54,8 +54,8 @@ ControllerConfig small_rbf() {
 void learn(Controller& controller, int n_steps) {
   for (int t = 0; t < n_steps; ++t) {
     const Numbers observed{0.1 * (t % 10), 1.0 * (t % 7)}, next{0.1 * ((t + 1) % 10), 1.0};
-    const auto taken = controller.act(observed);
-    const Numbers action(taken.begin(), taken.end());
+    const auto selected = controller.act(observed);
+    const Numbers action(selected.begin(), selected.end());
     const double dt = t % 4 == 3 ? 2.5 : 1.0;
     controller.learn(observed, action, 1.0 * (t % 3), next, t % 13 == 12, 0, {}, dt);
   }
@@ -68,12 +68,12 @@ TEST(AgentFile, AReadControllerContinuesLikeTheWrittenOne) {
       AgentFile file{Controller(config)};
       learn(file.controller, n_steps);
       file.write(folder / "agent");
-      AgentFile again(folder / "agent");
-      again.write(folder / "again");
-      EXPECT_EQ(testing::content_of(folder / "agent"), testing::content_of(folder / "again"));
+      AgentFile read_agent(folder / "agent");
+      read_agent.write(folder / "read_agent");
+      EXPECT_EQ(testing::content_of(folder / "agent"), testing::content_of(folder / "read_agent"));
       learn(file.controller, 40);
-      learn(again.controller, 40);
-      EXPECT_EQ(core::state_of(file.controller), core::state_of(again.controller));
+      learn(read_agent.controller, 40);
+      EXPECT_EQ(core::state_of(file.controller), core::state_of(read_agent.controller));
     }
   }
 }
@@ -147,7 +147,7 @@ TEST(AgentFile, RefusesInvalidFieldsByName) {
       0U);
   EXPECT_EQ(with("/approximator/n_inputs", 2.5),
             "approximator.n_inputs must be a whole number, got 2.5");
-  EXPECT_EQ(with("/approximator/n_inputs", 4294967298),
+  EXPECT_EQ(with("/approximator/n_inputs", 4294967298),  // 2^32 + 2 is no int
             "approximator.n_inputs must be a whole number, got 4294967298");
   EXPECT_EQ(with("/approximator/q_low", "low"), "approximator.q_low must be a number, got \"low\"");
   EXPECT_EQ(with("/approximator/circular", {1, 0}),

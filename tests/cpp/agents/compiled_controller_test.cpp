@@ -41,12 +41,12 @@ std::vector<AgentSpec> specs() {
     AgentSpec spec{.agent = agent,
                    .observation = kBounds,
                    .action = Box{.low = {-2.0}, .high = {2.0}},
-                   .seed = 18446744073709551615U,
+                   .seed = std::numeric_limits<std::uint64_t>::max(),
                    .settings = {{"warm_up_steps", 20}, {"learning.discount", 0.5}}};
     if (spec.agent == "sdnn-c") spec.preset = "small";
     if (spec.agent == "rbf") spec.settings["approximator.n_bases"] = 4;
     all.push_back(spec);
-    if (spec.agent == "fuzzy") continue;  // has no discrete actions
+    if (spec.agent == "fuzzy") continue;  // fuzzy agents have no discrete actions
     spec.action = Discrete{.n = 3, .start = -1};
     all.push_back(spec);
     spec.action = MultiDiscrete{.n = {3, 2}};
@@ -55,7 +55,8 @@ std::vector<AgentSpec> specs() {
   return all;
 }
 
-/// A plant of two variables, in two environments.
+/// Acts and learns in two environments with observations of two variables. They repeat with periods
+/// of 10 and 7 steps, and depend on no action.
 template <class Agent>
 void live(Agent& agent, int n_steps) {
   agent.set_n_environments(2);
@@ -63,8 +64,8 @@ void live(Agent& agent, int n_steps) {
     const auto environment = static_cast<std::size_t>(t % 3 == 2);
     if (t % 17 < 3) agent.begin_episode(environment);
     const Vector observed{0.1 * (t % 10), 1.0 * (t % 7)}, next{0.1 * ((t + 1) % 10), 1.0};
-    const auto taken = agent.act(observed, true, environment);
-    const Vector action(taken.begin(), taken.end());
+    const auto selected = agent.act(observed, true, environment);
+    const Vector action(selected.begin(), selected.end());
     agent.learn(observed, action, 1.0 * (t % 3) - action[0], next, t % 13 == 12, environment, {},
                 t % 4 == 3 ? 2.5 : 1.0);
   }
@@ -123,22 +124,23 @@ TEST(CompiledController, AReadAgentOfEveryTypeContinuesLikeTheWrittenOneAndAnAge
     live(agent, 60);
     agent.set_progress(0.25);
     agent.write(folder / "agent");
-    CompiledController again(folder / "agent");
+    CompiledController read_agent(folder / "agent");
     AgentFile file(folder / "agent");
     EXPECT_EQ(file.description()["kind"], spec.agent);
     EXPECT_EQ(file.description()["learning"]["discount"], 0.5);
     EXPECT_EQ(file.controller.n_dimensions(), agent.n_dimensions());
     live(agent, 40);
-    live(again, 40);
+    live(read_agent, 40);
     live(file.controller, 40);
     agent.write(folder / "agent");
-    again.write(folder / "again");
+    read_agent.write(folder / "read_agent");
     file.write(folder / "file");
-    EXPECT_EQ(testing::content_of(folder / "agent"), testing::content_of(folder / "again"));
+    EXPECT_EQ(testing::content_of(folder / "agent"), testing::content_of(folder / "read_agent"));
     EXPECT_EQ(testing::content_of(folder / "agent"), testing::content_of(folder / "file"));
     const std::array<double, 2> observation = {0.5, 3.0};
-    again.begin_greedy_episode();
-    EXPECT_TRUE(std::ranges::equal(again.act(observation, false), agent.act(observation, false)));
+    read_agent.begin_greedy_episode();
+    EXPECT_TRUE(
+        std::ranges::equal(read_agent.act(observation, false), agent.act(observation, false)));
   }
 }
 

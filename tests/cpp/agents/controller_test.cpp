@@ -29,7 +29,7 @@ using approximators::RBFNetworkConfig;
 using approximators::SDNNCConfig;
 using Numbers = std::vector<double>;
 
-// A pendulum's: cosine, sine, speed, and a circular one.
+/// The observation of a pendulum: cosine and sine of its angle, speed, and a circular variable.
 ObservationConfig pendulum() {
   return {.low = {-1.0, -1.0, -8.0, 10.0},
           .high = {1.0, 1.0, 8.0, 14.0},
@@ -84,11 +84,12 @@ Numbers action_of(Controller& controller, const Numbers& observed, std::size_t e
   return {action.begin(), action.end()};
 }
 
-/// A step of a task: what is observed wanders.
-void step(Controller& controller, core::Random& random, Numbers& observed, bool is_cut) {
+/// Acts and learns in a step of a task with random observations. With `is_saved`, a restored copy
+/// replaces the controller between acting and learning.
+void step(Controller& controller, core::Random& random, Numbers& observed, bool is_saved) {
   const Numbers action = action_of(controller, observed);
   for (const double a : action) ASSERT_LE(std::abs(a), 2.0);
-  if (is_cut) {  // another takes over, between acting and learning
+  if (is_saved) {
     controller = Controller::restored(controller.config(), core::state_of(controller));
   }
   Numbers next(4);
@@ -101,17 +102,17 @@ void step(Controller& controller, core::Random& random, Numbers& observed, bool 
 }
 
 void expect_exact_resume(const ControllerConfig& config, std::size_t n_environments = 1) {
-  Controller uncut(config), resumed(config);
-  uncut.set_n_environments(n_environments);
+  Controller uninterrupted(config), resumed(config);
+  uninterrupted.set_n_environments(n_environments);
   resumed.set_n_environments(n_environments);
   core::Random random(5, core::Stream::weights), same(5, core::Stream::weights);
   Numbers observed{1.0, 0.0, 0.0, 0.0}, resumed_observed = observed;
   for (int t = 0; t < 90; ++t) {
-    step(uncut, random, observed, false);
+    step(uninterrupted, random, observed, false);
     step(resumed, same, resumed_observed, t % 10 == 3);
   }
-  EXPECT_EQ(core::state_of(uncut), core::state_of(resumed));
-  EXPECT_FALSE(uncut.is_warming_up());
+  EXPECT_EQ(core::state_of(uninterrupted), core::state_of(resumed));
+  EXPECT_FALSE(uninterrupted.is_warming_up());
 }
 
 TEST(Controller, ContinuesExactlyAfterItWasSavedAtAnyStep) {
@@ -175,7 +176,7 @@ TEST(Controller, GivesTheSameActionsToConcurrentReaders) {
       }
       return actions;
     };
-    // Before any other reader: the first one rounds averaged weights.
+    // Threads read first, because the first reader computes the averaged weights for all.
     const auto read_together = testing::in_threads(4, best);
     const std::array alone{best(0), best(1)};
     for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(read_together[i], alone[i % 2]);
@@ -201,14 +202,14 @@ TEST(Controller, WithSeveralEnvironmentsActsAndLearnsLikeItsAgent) {
   agent.set_n_environments(3);
   controller.set_n_environments(3);
   for (std::size_t t = 0; t < 60; ++t) {
-    const std::size_t robot = t * t % 3;  // 0 and 1
+    const std::size_t robot = t * t % 3;  // 0 for multiples of 3, else 1
     if (t % 7 == 0) {
       agent.begin_episode(robot);
       controller.begin_episode(robot);
     }
     const double picked = agent.act(kPendulumState, true, robot);
     const Numbers action = action_of(controller, kPendulumObserved, robot);
-    (void)controller.act(kPendulumObserved, true, 2);  // another one decides meanwhile
+    (void)controller.act(kPendulumObserved, true, 2);  // an action in a third environment
     (void)agent.act(kPendulumState, true, 2);
     agent.learn(kPendulumState, picked, 1.0, kPendulumState, false, robot);
     controller.learn(kPendulumObserved, action, 1.0, kPendulumObserved, false, robot);
@@ -222,19 +223,19 @@ TEST(Controller, WithSeveralEnvironmentsActsAndLearnsLikeItsAgent) {
 // taken as index 1 is learned as such; otherwise it is learned as index 2, whose value is 1
 // exactly.
 TEST(Controller, LearnsTheIndexThatWasTakenOfEqualRoundedActions) {
-  for (const bool leaves : {false, true}) {
+  for (const bool is_removed : {false, true}) {  // removing the environment forgets its action
     auto config = with(kBases, QLearningConfig{.policy = {.epsilon = 1.0, .n_greedy_steps = 0}});
     config.action = {.low = {0.0}, .high = {2.0}, .number = ActionNumber::whole};
     Controller controller(config);
     controller.set_n_environments(2);
     auto agent = std::get<QLearning<RBFNetwork>>(controller.agent());
-    const std::vector<std::size_t> learned = {leaves ? 2U : 1U};
+    const std::vector<std::size_t> learned = {is_removed ? 2U : 1U};
     for (std::size_t index = 0; index != 1;) {
       index = agent.act(kPendulumState, true, 1).front();
       ASSERT_EQ(controller.act(kPendulumObserved, true, 1)[0],
                 std::floor(0.5 * double(index) + 0.5));
     }
-    if (leaves) {
+    if (is_removed) {
       for (const std::size_t n : {1U, 2U}) controller.set_n_environments(n);
     }
     (void)controller.act(Numbers(4, 0.5), false, 1);  // a greedy action is not the one taken
@@ -288,10 +289,10 @@ TEST(Controller, RefusesInconsistentStates) {
   refused(testing::with_number<std::int64_t>(good, "taken.indices", 5));
   refused(testing::with_number<std::int64_t>(good, "taken.indices", -1));
   refused(testing::with_number<std::int64_t>(good, "taken.environments", 1));
-  refused(testing::with_number<std::uint8_t>(good, "is_warming_up", 1));  // ranges are known
+  refused(testing::with_number<std::uint8_t>(good, "is_warming_up", 1));  // all ranges are given
 }
 
-// A state may ask for no more memory than it has arrays.
+// Sizes of a state are compared with the settings before memory for the settings is allocated.
 TEST(Controller, RefusesStatesOfWrongSizeBeforeItAllocatesMemory) {
   const auto error_of = [](const ControllerConfig& config, const core::State& state) {
     return testing::message_of([&] { (void)Controller::restored(config, state); });

@@ -15,7 +15,7 @@ struct Count {
   int steps = 0;
 };
 
-/// An object with episodes, which begin with `first` steps.
+/// An object with episodes, whose counts of steps start at `first`.
 struct Counting {
   int first = 5;
   Episodes<Count> episodes{Count{first}};

@@ -62,9 +62,9 @@ TEST(EpsilonGreedy, ValuesWithinTheToleranceOfTheBestAreTies) {
   const auto selected = [&](TieRule rule, double tolerance) {
     return EpsilonGreedy({.tie_rule = rule, .tie_tolerance = tolerance}, 1).select(values, 0, true);
   };
-  EXPECT_EQ(selected(TieRule::middle, 0.0), 5U);
-  EXPECT_EQ(selected(TieRule::middle, 0.25), 1U);
-  EXPECT_EQ(selected(TieRule::middle, 0.5), 2U);
+  EXPECT_EQ(selected(TieRule::middle, 0.0), 5U);   // the best one alone
+  EXPECT_EQ(selected(TieRule::middle, 0.25), 1U);  // the longest run of ties: 1 and 2
+  EXPECT_EQ(selected(TieRule::middle, 0.5), 2U);   // 1, 2 and 3
   EXPECT_EQ(selected(TieRule::lowest, 0.5), 1U);
   EpsilonGreedy uniform({.tie_tolerance = 0.25}, 1);
   std::array<int, 7> counts{};
@@ -119,7 +119,7 @@ TEST(EpsilonGreedy, FirstStepsAreGreedyAndLaterOnesRandomWithProbabilityEpsilon)
     others_late += policy.select(values, 10 + i % 40, true) != 7;
   }
   EXPECT_EQ(others_early, 0);
-  const double p = 0.1 * 49 / 50;  // a random action may be the best one
+  const double p = 0.1 * 49 / 50;  // one of 50 random actions is the best one
   EXPECT_NEAR(others_late, n * p, 5 * std::sqrt(n * p * (1 - p)));
 }
 
@@ -156,7 +156,7 @@ TEST(EpsilonGreedy, EqualSeedsGiveEqualActionsAndOtherSeedsDifferentOnes) {
     EXPECT_EQ(action, same.select(tied, i, true));
     differ += action != other_seed.select(tied, i, true);
   }
-  EXPECT_GT(differ, 90);  // equal ones of 601 are rare
+  EXPECT_GT(differ, 90);  // two of 601 random actions are rarely equal
 }
 
 // Eigen's maximum of a row with NaN is NaN or a number: the row is refused, or the number selected.

@@ -26,9 +26,10 @@ TEST(ErrorScale, NormalizesErrorsToARootMeanSquareOfOne) {
   ErrorScale scale;
   double sum = 0.0;
   for (int i = 0; i < 4000; ++i) {
+    // Errors of standard deviation 2^28, in units of 2^-30.
     const double error = 0x1p28 * random.normal();
     const double normalized = scale.normalized(std::llround(error), -30) / kOne;
-    EXPECT_LE(std::abs(normalized), 3.0);
+    EXPECT_LE(std::abs(normalized), 3.0);  // larger ones are clipped
     if (i >= 2000) sum += normalized * normalized;
   }
   EXPECT_NEAR(sum / 2000, 1.0, 0.1);
@@ -43,7 +44,7 @@ TEST(ErrorScale, NormalizesTheFirstErrorToPlusOrMinusOne) {
 
 TEST(ErrorScale, DoesNotDependOnTheUnit) {
   ErrorScale scale, coarser_scale;  // whose unit doubles every ten errors
-  const int rounding = 3;
+  const int rounding = 3;           // in units of 1 / 4096
   for (int i = 0; i < 50; ++i) {
     const std::int64_t error = (std::int64_t{i} - 20) << 24;
     const int n_doubled = i / 10;

@@ -94,7 +94,7 @@ TEST(FuzzyQLearning, TracesDecayByDiscountTimesLambdaAsWorkedByHand) {
   const double step = 0.5 * (1.0 - static_cast<double>(0.45F));
   EXPECT_FLOAT_EQ(v(0), static_cast<float>(0.45 + step * 1.2025));
   EXPECT_FLOAT_EQ(v(1), static_cast<float>(1.0 + step * 0.45));
-  act_and_learn(1.0, 4.0, 1.0, true);  // the traces end with the episode
+  act_and_learn(1.0, 4.0, 1.0, true);  // step = 0.5 * 4; the traces end with the episode
   const float v1 = v(1);
   EXPECT_EQ(v(2), 2.0F);
   act_and_learn(1.0, 4.0, 1.0, true);
@@ -239,7 +239,7 @@ TEST(FuzzyQLearning, RefusesInconsistentStates) {
   (void)agent.act(State{0.2, 0.3});
   testing::expect_that_damage_is_refused(agent);
   const core::State good = core::state_of(agent);
-  ASSERT_EQ(good.at("eligibilities").size(), 8U);
+  ASSERT_EQ(good.at("eligibilities").size(), 8U);  // two steps, in each of which 2^2 rules fired
   using testing::with_number;
   const auto refused = [&](const core::State& bad, const std::string& message) {
     testing::expect_refused(agent, bad, "state: " + message);

@@ -83,7 +83,8 @@ TEST(History, NoneDoesNotChangeStates) {
   EXPECT_TRUE(memory.empty());
 }
 
-// Changes in the experience: 0.2 of the number and, the shorter way, 0.1 of the angle; a symbol.
+// In the experience a number changes by 0.2, an angle by 0.1 (the shorter way), and a symbol, which
+// has no difference.
 TEST(History, DifferencesOfNumbersAndAnglesAreAppendedAsWorkedByHand) {
   const RandomExperience experience{.n_inputs = 3,
                                     .states = {0.5, 0.95, 0.25},
@@ -106,7 +107,7 @@ TEST(History, DifferencesOfNumbersAndAnglesAreAppendedAsWorkedByHand) {
   EXPECT_DOUBLE_EQ(state[3], 0.5 + 0.15 / 0.3 / 2.0);
   EXPECT_NEAR(state[4], 0.5 + 0.03 / 0.15 / 2.0, 1e-12);
   filter.follow(Numbers{0.0}, Numbers{0.0, 0.01, 0.75}, memory, state, room);
-  EXPECT_DOUBLE_EQ(state[3], 0.0);  // beyond the largest one
+  EXPECT_DOUBLE_EQ(state[3], 0.0);  // -0.55 is clipped to -0.3
 }
 
 TEST(History, AveragesMoveByAHalfAndAFifthOfTheDistance) {
@@ -146,17 +147,17 @@ TEST(History, AnObserverReducesTheErrorOfNoisySensors) {
   const auto row = [](const Numbers& rows, std::size_t t) {
     return std::span(rows).subspan(2 * t, 2);
   };
-  double of_estimates = 0.0, of_sensors = 0.0;
+  double error_of_estimates = 0.0, error_of_sensors = 0.0;  // sums of squares
   filter.begin(row(fresh.experience.states, 0), memory, state, room);
   for (std::size_t t = 0; t < kSteps; ++t) {
     const auto sensed = row(fresh.experience.next_states, t), exact = row(fresh.exact, t);
     filter.follow(Numbers{fresh.experience.actions[0][t]}, sensed, memory, state, room);
     for (std::size_t i = 0; i < 2; ++i) {
-      of_estimates += (state[i] - exact[i]) * (state[i] - exact[i]);
-      of_sensors += (sensed[i] - exact[i]) * (sensed[i] - exact[i]);
+      error_of_estimates += (state[i] - exact[i]) * (state[i] - exact[i]);
+      error_of_sensors += (sensed[i] - exact[i]) * (sensed[i] - exact[i]);
     }
   }
-  EXPECT_LT(of_estimates, 0.6 * of_sensors);
+  EXPECT_LT(error_of_estimates, 0.6 * error_of_sensors);
 }
 
 /// An agent that pushes the mass; each action lasts a step.
@@ -363,11 +364,11 @@ TEST(History, SizesThatAHistoryMakesImpossibleAreRefusedAtOnce) {
   config.observation.history = History::automatic;
   EXPECT_NO_THROW(Controller(config, tables));
   config.observation.history = History::observer;
-  config.warm_up_steps = 99;
+  config.warm_up_steps = 99;  // an observer needs 100 transitions
   EXPECT_THROW(Controller{config}, std::invalid_argument);
   config.warm_up_steps = 100;
   EXPECT_NO_THROW(Controller{config});
-  config.observation.low.assign(17, 0.0);
+  config.observation.low.assign(17, 0.0);  // an observer has at most 16 inputs
   config.observation.high.assign(17, 1.0);
   EXPECT_THROW(Controller{config}, std::invalid_argument);
   config.observation.relevant_only = true;  // some may be left out

@@ -1,4 +1,4 @@
-/// Random lives of agents.
+/// Sequences of random episodes for agents.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -38,7 +38,8 @@ Number copied(Number action) {
   return action;
 }
 
-/// A world of random states and rewards, in which copies of an agent have the same life.
+/// A task of random states and rewards, which are equal for copies of an agent that start with
+/// equal worlds.
 template <class Agent>
 class World {
  public:
@@ -49,8 +50,8 @@ class World {
         random_(seed, core::Stream::sensor_noise),
         state_(n_inputs, 0.5) {}
 
-  /// The next thing that happens to an agent: an episode begins, it acts, or it learns. Returns
-  /// the action that it took, if any.
+  /// Takes the next of three steps: begins an episode, lets the agent act, or lets it learn.
+  /// Returns the action of the agent, if it acted.
   std::optional<Action> step(Agent& agent) {
     if (begins_) {
       agent.begin_episode(environment_);
@@ -67,7 +68,7 @@ class World {
     std::vector<double> next(state_.size());
     for (double& x : next) x = static_cast<double>(random_.below(9)) / 8.0;
     const bool terminated = random_.below(16) == 0;
-    // Now and then a larger one, so that ranges which follow the rewards grow.
+    // A reward in 32 is eight times as large, so that ranges which follow the rewards grow.
     const double scale = random_.below(32) == 0 ? 32.0 : 4.0;
     const double reward = scale * static_cast<double>(random_.below(5)) - 2.0 * scale;
     agent.learn(state_, action_, reward, next, terminated, environment_);
@@ -82,7 +83,7 @@ class World {
   }
 
  private:
-  /// In (0, 1], or that of the progress.
+  /// A random rate in (0, 1], or none, so that the rate follows the progress.
   std::optional<double> rate() {
     if (random_.below(2) == 0) return std::nullopt;
     return 1.0 - random_.uniform();

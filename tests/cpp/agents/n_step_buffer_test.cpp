@@ -52,15 +52,15 @@ TEST(NStepBuffer, TheReturnOfTheOldestStepDiscountsLaterRewards) {
   NStepBuffer steps = buffer_of(3);
   EXPECT_EQ(steps.return_of_oldest(5.0, 0.5), 5.0);  // the value of the next state alone
   for (int i = 0; i < 3; ++i) add(steps, i);
-  EXPECT_EQ(steps.return_of_oldest(16.0, 0.5), 1.0 + 1.0 + 1.0 + 2.0);
+  EXPECT_EQ(steps.return_of_oldest(16.0, 0.5), 1.0 + 2.0 / 2 + 4.0 / 4 + 16.0 / 8);
   EXPECT_EQ(steps.return_of_oldest(16.0, 0.0), 1.0);
   for (int i = 3; i < 5; ++i) {
     steps.take_oldest();
     add(steps, i);
   }
-  EXPECT_EQ(steps.return_of_oldest(-8.0, 0.5), 4.0 + 4.0 + 4.0 - 1.0);  // 4, 8, 16
+  EXPECT_EQ(steps.return_of_oldest(-8.0, 0.5), 4.0 + 8.0 / 2 + 16.0 / 4 - 8.0 / 8);
   steps.take_oldest();
-  EXPECT_EQ(steps.return_of_oldest(-8.0, 0.5), 8.0 + 8.0 - 2.0);
+  EXPECT_EQ(steps.return_of_oldest(-8.0, 0.5), 8.0 + 16.0 / 2 - 8.0 / 4);
 }
 
 // Durations 2, 1/2 and 1 with gamma = 1/4: discounts 1/16, 1/2 and 1/4.
@@ -82,7 +82,7 @@ TEST(NStepBuffer, KnowsTheNextStateOfTheNewestStep) {
   NStepBuffer steps = buffer_of(2);
   EXPECT_TRUE(steps.is_continued_by(Numbers{0.9}));  // nothing is pending
   add(steps, 3);
-  EXPECT_TRUE(steps.is_continued_by(Numbers{0.25}));
+  EXPECT_TRUE(steps.is_continued_by(Numbers{(3 + 1) / 16.0}));
   EXPECT_FALSE(steps.is_continued_by(Numbers{0.26}));
   steps.take_oldest();
   EXPECT_TRUE(steps.is_continued_by(Numbers{0.26}));

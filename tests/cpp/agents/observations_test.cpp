@@ -48,9 +48,10 @@ std::string error_of(const ObservationConfig& config) {
 }
 
 TEST(Observations, AreFittedWithAQuarterOfTheirWidthMoreAtEachEnd) {
+  // Two observations of three variables: 0 and 4, -5 and 5, and a constant of 7.
   const auto observations = fitted(unbounded(3), {0.0, -5.0, 7.0, 4.0, 5.0, 7.0});
-  EXPECT_EQ(low_of(observations), (Numbers{-1.0, -7.5, 5.25}));  // a constant: a quarter of itself
-  EXPECT_EQ(high_of(observations), (Numbers{5.0, 7.5, 8.75}));
+  EXPECT_EQ(low_of(observations), (Numbers{-1.0, -7.5, 7.0 - 7.0 / 4}));
+  EXPECT_EQ(high_of(observations), (Numbers{5.0, 7.5, 7.0 + 7.0 / 4}));
   const ObservationConfig half_known{.low = {{}, 0.0}, .high = {{}, 1.0}};
   EXPECT_EQ(low_of(fitted(half_known, {0.0, 0.4, 4.0, 0.6})), (Numbers{-1.0, 0.0}));
 }
@@ -70,9 +71,10 @@ TEST(Observations, AdaptiveRangesExcludeRareValuesAndStayWithinFixedOnes) {
     observed.push_back(t == 0 ? 1.0 : 0.0);  // constant but for a rare value
     observed.push_back(is_first ? -1e9 : is_last ? 1e9 : 8.0 * part);
     observed.push_back(0.1);                 // an angle
-    observed.push_back(t < 20 ? 0.0 : 3.0);  // beyond its bounds
+    observed.push_back(t < 20 ? 0.0 : 3.0);  // beyond its bound of 1, which extends the range to 3
   }
   const auto observations = fitted(config, observed);
+  // The ranges without rare values, 2 to 6 and 0 to 8, are extended by a quarter at each end.
   EXPECT_EQ(low_of(observations), (Numbers{1.0, 0.0, 0.0, -2.0, -pi, -0.75}));
   EXPECT_EQ(high_of(observations), (Numbers{7.0, 4.0, 1.0, 10.0, pi, 3.0}));
 }
@@ -138,7 +140,7 @@ TEST(Observations, CodeSymbolsAsOneInputOrAsVariables) {
 /// An angle that wanders as its cosine and sine, with noise, and a radius that does or does not.
 Numbers wandering(double noise, double radius_moves) {
   core::Pcg64 random(std::array<std::uint64_t, 1>{3});
-  const auto normal = [&random] {
+  const auto normal = [&random] {  // nearly: a sum of 12 uniform numbers has the variance 1
     double sum = -6.0;
     for (int i = 0; i < 12; ++i) sum += random.uniform();
     return sum;
@@ -151,7 +153,7 @@ Numbers wandering(double noise, double radius_moves) {
     path.push_back(radius * std::cos(angle) + noise * normal());
     path.push_back(radius * std::sin(angle) + noise * normal());
   }
-  Numbers observed(path.begin(), path.end() - 2);
+  Numbers observed(path.begin(), path.end() - 2);  // observations, then the next ones
   observed.insert(observed.end(), path.begin() + 2, path.end());
   return observed;
 }
@@ -165,11 +167,11 @@ TEST(Observations, FindNoisyAnglesButNotPositions) {
   EXPECT_EQ(n_inputs(wandering(0.0, 0.0)), 1U);
   EXPECT_EQ(n_inputs(wandering(0.1, 0.0)), 1U);
   EXPECT_EQ(n_inputs(wandering(0.2, 0.0)), 1U);
-  EXPECT_EQ(n_inputs(wandering(0.6, 0.0)), 2U);  // too much noise to tell
-  EXPECT_EQ(n_inputs(wandering(0.1, 0.3)), 2U);  // the distance matters
+  EXPECT_EQ(n_inputs(wandering(0.6, 0.0)), 2U);  // noise hides the circle
+  EXPECT_EQ(n_inputs(wandering(0.1, 0.3)), 2U);  // the radius moves, too
   Numbers few = wandering(0.1, 0.0);
   few.resize(200);
-  EXPECT_EQ(n_inputs(few), 2U);
+  EXPECT_EQ(n_inputs(few), 2U);  // 100 observations of two variables are too few
 }
 
 TEST(Observations, AppendInputsThatAreAddedLaterAndRestoreThem) {
@@ -217,7 +219,7 @@ TEST(Observations, RefuseBadConfigurationsByTheirField) {
   names("observation.high", [](auto& bad) { bad.high[0] = -1.0; });
   names("angles", [](auto& bad) { bad.angles = {3}; });
   names("angles", [](auto& bad) { bad.angles = {-1}; });
-  names("angles", [](auto& bad) { bad.angles = {2}; });  // of a symbol
+  names("angles", [](auto& bad) { bad.angles = {2}; });  // a variable of the symbol
   names("angles", [](auto& bad) { bad.angles = {0, 0}; });
   names("angles", [](auto& bad) {
     bad.angles = {0};

@@ -33,6 +33,7 @@ QLambda agent_of(const QLambdaConfig& config, std::vector<std::size_t> n_actions
       config, seed};
 }
 
+/// Q(state, action).
 double q(const QLambda& agent, const State& state, std::size_t action) {
   auto workspace = agent.workspace();
   return agent.values(state, workspace)[action];
@@ -68,10 +69,11 @@ TEST(QLambda, TargetsOfOneStepAreAsWorkedByHand) {
   EXPECT_NEAR(q(agent, a, 0), 5.0, 0.5);
 }
 
-// gamma = 1/2 and a transition of 2 steps: a quarter of what follows remains; of half a step, 0.71.
+// With gamma = 1/2 the next value is discounted by 1/4 over two steps, by sqrt(1/2) over half a
+// step.
 TEST(QLambda, DurationsDiscountTargets) {
   const State a{0.1, 0.1}, b{0.9, 0.9};
-  for (const auto& [dt, remaining] : {std::pair(2.0, 0.25), std::pair(0.5, 0.7071)}) {
+  for (const auto& [dt, remaining] : {std::pair(2.0, 0.25), std::pair(0.5, std::sqrt(0.5))}) {
     QLambda agent = agent_of({.learning_rate = 1.0, .discount = 0.5, .final_learning_rate = {}});
     agent.learn(b, Indices{2}, 8.0, b, true);
     agent.learn(a, Indices{0}, 1.0, b, false, 0, {}, dt);
@@ -216,7 +218,7 @@ int longest_action(QLambda agent, int n_ended) {
   Indices last;
   int longest = 0, n = 0;
   for (int i = 0; i < 5000; ++i) {
-    if (i % 1000 == 0) agent.begin_episode();  // long episodes have excursions
+    if (i % 1000 == 0) agent.begin_episode();  // before excursions begin, after 2,000 steps
     const auto span = agent.act(state);
     const Indices action(span.begin(), span.end());
     n = action == last ? n + 1 : 1;  // of 250^2 actions, two successive ones are hardly ever equal
@@ -252,14 +254,14 @@ TEST(QLambda, StepsOfExcursionsAreTheWorstOnesAndAreLearnedOnlyIfTheyTerminate) 
     agent.learn(state, action, 1.0, state, false);
     if (agent.n_learned() > before.n_learned()) continue;
     ++n_left_out;
-    EXPECT_GE(i, 2000);
+    EXPECT_GE(i, 2000);  // no excursion begins in the first 2,000 steps of an episode
     const auto values = agent.values(state, workspace);
     EXPECT_EQ(values[action[0]], std::ranges::min(values));
     QLambda ended = before;
     ended.learn(state, action, 1.0, state, true);
     EXPECT_EQ(ended.n_learned(), before.n_learned() + 1);
   }
-  EXPECT_GT(n_left_out, 500);
+  EXPECT_GT(n_left_out, 500);  // of the 2,000 steps that may be steps of excursions
   EXPECT_LT(n_left_out, 1500);
 }
 
@@ -298,7 +300,7 @@ TEST(QLambda, EnvironmentsHaveSeparateTraces) {
   const State a{0.1, 0.1}, b{0.5, 0.5};
   together.learn(a, Indices{0}, 0.0, b, false, 0);
   together.learn(b, Indices{1}, 1.0, b, true, 1);  // no trace of environment 0 carries it back
-  EXPECT_NEAR(q(together, a, 0), 0.0, 0.3);
+  EXPECT_NEAR(q(together, a, 0), 0.0, 0.3);        // similar codes share some weights
   together.set_n_environments(1);
   EXPECT_THROW(together.learn(a, Indices{0}, 0.0, b, false, 1), std::invalid_argument);
 }

@@ -24,10 +24,10 @@ TEST(QLearning, RatesChangeLinearlyWithProgress) {
   EXPECT_EQ(agent.learning_rate(), 0.5);
   EXPECT_EQ(agent.epsilon(), 0.75);
   agent.set_progress(0.25);
-  EXPECT_EQ(agent.learning_rate(), 0.4375);
-  EXPECT_EQ(agent.epsilon(), 0.5625);
+  EXPECT_EQ(agent.learning_rate(), 0.75 * 0.5 + 0.25 * 0.25);
+  EXPECT_EQ(agent.epsilon(), 0.75 * 0.75);
   agent.learn(cell(0), 0, 16.0, cell(1), true);
-  EXPECT_EQ(agent.network().value(cell(0), 0), 7.0);
+  EXPECT_EQ(agent.network().value(cell(0), 0), 0.4375 * 16.0);
   agent.set_progress(1.0);
   EXPECT_EQ(agent.learning_rate(), 0.25);
   EXPECT_EQ(agent.epsilon(), 0.0);

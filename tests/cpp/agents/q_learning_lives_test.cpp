@@ -36,7 +36,7 @@ TEST(QLearning, EnvironmentsHaveSeparatePendingSteps) {
   EXPECT_EQ(q(0, 0), 1.0 + 0.5 * 2.0);
   EXPECT_EQ(q(0, 1), 8.0 + 0.5 * 8.0);
   EXPECT_EQ(q(1, 0), 0.0);
-  agent.begin_episode(1);  // of the other nothing is learned
+  agent.begin_episode(1);  // learns pending steps of this environment only
   EXPECT_EQ(q(1, 0), 0.0);
   EXPECT_EQ(q(1, 1), 8.0);
   agent.set_n_environments(1);
@@ -108,7 +108,7 @@ TEST(QLearning, RefusesInconsistentStates) {
          core::state_of(agent).at("n_step_buffer.rewards").size() < 2) {
     world.step(agent);
   }
-  agent.set_learning_rate(std::nullopt);  // what may be missing
+  agent.set_learning_rate(std::nullopt);  // damage then includes these optional numbers
   agent.set_epsilon(std::nullopt);
   testing::expect_that_damage_is_refused(agent);
   const core::State good = core::state_of(agent);
@@ -125,7 +125,7 @@ TEST(QLearning, RefusesInconsistentStates) {
   core::State bad = good;
   bad["kept_action"] = testing::tensor_of<std::int64_t>({0, 0});
   refused(bad, "kept_action must be one per dimension");
-  bad = good;  // as many as the ring has places: the next would have none
+  bad = good;  // four steps are pending in a buffer of four, where the next step has no place
   bad["n_step_buffer.rewards"] = testing::tensor_of(std::vector<double>(4, 0.0));
   bad["n_step_buffer.actions"] = testing::tensor_of(std::vector<std::int64_t>(4, 0));
   bad["n_step_buffer.states"] = testing::tensor_of(std::vector<double>(8, 0.0));

@@ -172,7 +172,8 @@ TEST(QLearning, ARepeatedActionEndsWithTheEpisodeAndNotWithEvaluations) {
     begun.begin_episode();
     EXPECT_NE(begun.act(cell(0)), action);
   }
-  // A random action lasts at least two steps with probability 1/2: 5 standard deviations.
+  // A random action lasts at least two steps with probability 1/2; five standard deviations of 200
+  // trials are 5 * sqrt(200 / 4) = 35.4.
   EXPECT_NEAR(n_kept, 100, 36);
 }
 
@@ -224,7 +225,7 @@ TEST(QLearning, AnAdaptiveRangeOfValuesFollowsTheRewards) {
   const auto scale = [&agent]() -> const auto& { return agent.network().output_scale(); };
   const std::vector<double> state = {0.3, 0.6};
   agent.learn(state, 0, 0.0, state, false);
-  EXPECT_EQ(scale().q_low(), -16.0);  // nothing is known yet
+  EXPECT_EQ(scale().q_low(), -16.0);  // the configured range, as all returns were 0
   EXPECT_EQ(scale().q_high(), 16.0);
   agent.learn(state, 0, 8.0, state, false);
   EXPECT_EQ(scale().q_low(), 0.0);
@@ -273,12 +274,12 @@ TEST(QLearning, ACorrectionMovesEveryDimensionByTheErrorOfTheMean) {
   second.update(cell(0), 2, 6.0);
   QLearning<LookupTable> agent({first, second}, {.learning_rate = 0.5, .discount = 0.5}, 1);
   agent.learn(cell(0), Indices{1, 2}, 8.0, cell(1), true);
-  EXPECT_EQ(agent.networks()[0].value(cell(0), 1), 4.0);  // half of 2 and half of 2 + 4
-  EXPECT_EQ(agent.networks()[1].value(cell(0), 2), 8.0);  // half of 6 and half of 6 + 4
+  EXPECT_EQ(agent.networks()[0].value(cell(0), 1), 4.0);  // rate 1/2 towards 2 + (8 - 4)
+  EXPECT_EQ(agent.networks()[1].value(cell(0), 2), 8.0);  // rate 1/2 towards 6 + (8 - 4)
   EXPECT_EQ(agent.networks()[0].value(cell(0), 0), 0.0);
   EXPECT_EQ(agent.networks()[1].value(cell(0), 1), 0.0);
   agent.learn(cell(1), Indices{0, 0}, 1.0, cell(0), false);  // the best value is (4 + 8) / 2
-  EXPECT_EQ(agent.networks()[0].value(cell(1), 0), 0.5 * (1.0 + 0.5 * 6.0));
+  EXPECT_EQ(agent.networks()[0].value(cell(1), 0), 0.5 * (1.0 + 0.5 * (4.0 + 8.0) / 2.0));
 }
 
 TEST(QLearning, DimensionsHaveDifferentSeedsAndTheFirstThatOfTheAgent) {
@@ -296,7 +297,7 @@ TEST(QLearning, RefusesNetworksOfDifferentInputs) {
                std::invalid_argument);
 }
 
-/// Some steps at random states, after each of which `check` is called with the state.
+/// Learns 300 steps between random states, and calls check(state) after each step.
 template <class Check>
 void learn_at_random(OneDimension<QLearning<SDNNC>>& agent, const Check& check) {
   core::Random random(4, core::Stream::exploration);
@@ -327,7 +328,7 @@ TEST(QLearning, TheBestActionByCountsIsTheBestByValues) {
         learn_at_random(agent, [&](const std::vector<double>& state) {
           const std::size_t action = agent.best_action(state, workspace, ties);
           ASSERT_EQ(action, by_values.best_action(agent.values(state, workspace), same_ties));
-          if (rule == TieRule::uniform) return;  // drawn from the agent's own stream
+          if (rule == TieRule::uniform) return;  // best_of draws ties from the agent's own stream
           std::vector<std::uint8_t> mask(agent.n_actions(0));
           for (std::size_t a = 0; a < mask.size(); ++a) mask[a] = a % 5 == 2 ? 1 : 0;
           std::vector<double> values = agent.workspace().values[0];

@@ -25,7 +25,7 @@ TEST(RangeNotes, StateTheSharesOfRangesThatAreUsedAndOfValuesBeyondThem) {
   // About one step in eight is noted and the last 256 notes are kept: 2048 steps of 1/100. The
   // middle 90 % of the noted values are the used range.
   EXPECT_NEAR(use[0]->share_used, 0.9 * 2048 / 100.0 / 100.0, 0.02);
-  EXPECT_EQ(use[1]->share_used, 0.5);
+  EXPECT_EQ(use[1]->share_used, 0.5);  // from 0 to 1; 3 is clipped to 1
   EXPECT_NEAR(use[1]->share_beyond, 0.25, 0.08);
   EXPECT_FALSE(use[2]);  // an angle
   EXPECT_EQ(use[3]->share_used, 0.0);

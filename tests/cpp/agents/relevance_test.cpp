@@ -15,8 +15,8 @@
 namespace sdnn::agents {
 namespace {
 
-/// A position that a velocity moves, which actions change; and noise, which remembers `memory` of
-/// itself. Rewards come near position 1, if at all.
+/// Inputs are a position, a velocity that actions change, and `n_noise` autoregressive noises with
+/// the coefficient `memory`. With `is_rewarded`, positions above 0.8 are rewarded.
 RandomExperience pushed_mass(std::size_t n, std::size_t n_noise, double memory, bool is_rewarded,
                              std::uint64_t seed) {
   core::Random random(seed, core::Stream::useless_inputs);
@@ -86,7 +86,7 @@ TEST(Relevance, KeepsListedInputsAndThoseThatPredictThem) {
   const auto experience = pushed_mass(1000, 3, /*memory=*/0.0, /*is_rewarded=*/false, /*seed=*/1);
   EXPECT_EQ(Relevance(experience).inputs({false, false, false, true, false}),
             (std::vector<bool>{true, true, false, true, false}));
-  RandomExperience still = experience;  // neither actions nor rewards: the position is known
+  RandomExperience still = experience;  // without actions; the position is the only listed input
   std::ranges::fill(still.actions[0], 0.0);
   EXPECT_EQ(Relevance(still).inputs({true, false, false, false, false}),
             (std::vector<bool>{true, true, false, false, false}));
@@ -121,7 +121,7 @@ TEST(Relevance, KeepsHardlyAnyOfManyNoiseInputs) {
       n_noise_kept += static_cast<int>(std::ranges::count(kept, true)) - 2;
     }
   }
-  EXPECT_LE(n_noise_kept, 2);  // of 1,290; 40 without regard to the number of comparisons
+  EXPECT_LE(n_noise_kept, 2);  // of 1,290; about 40 without a correction for multiple comparisons
 }
 
 /// The experience with its inputs in another order.
@@ -155,8 +155,8 @@ TEST(Relevance, DoesNotDependOnTheOrderOfInputs) {
   }
 }
 
-/// A walk over cells on a line, which actions move, with the cell as the first `n_cells` inputs,
-/// and as many cells behind them over which something else walks by itself.
+/// Two one-hot vectors of `n_cells` inputs: a cell on a line that actions move, and a cell that is
+/// drawn at random in each step.
 RandomExperience two_walks(std::size_t n, std::size_t n_cells, std::uint64_t seed) {
   core::Random random(seed, core::Stream::useless_inputs);
   RandomExperience experience{.n_inputs = 2 * n_cells, .circular = std::vector<bool>(2 * n_cells)};
@@ -268,7 +268,7 @@ TEST(BinaryGroups, HoldConstantsAtAnEndOfTheirRange) {
 }
 
 TEST(Relevance, TreatsAnAngleThatWrapsAroundAsASmallChange) {
-  // The angle moves by what the second input tells, all round; the third is noise.
+  // The second input is the speed of the angle, which goes round and round; the third is noise.
   core::Random random(3, core::Stream::useless_inputs);
   RandomExperience experience{.n_inputs = 3, .circular = {true, false, false}};
   experience.actions.resize(1);

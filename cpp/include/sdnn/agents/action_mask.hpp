@@ -32,7 +32,7 @@ inline bool allows(ActionMask part, std::size_t action) noexcept {
 
 /// Whether a dimension's mask has only zeros and ones, and allows an action.
 inline bool is_mask(ActionMask part) noexcept {
-  return std::ranges::all_of(part, [](auto one) { return one <= 1; }) &&
+  return std::ranges::all_of(part, [](auto entry) { return entry <= 1; }) &&
          std::ranges::find(part, 1) != part.end();
 }
 
@@ -42,7 +42,7 @@ template <class Draw>
 std::size_t draw_allowed(ActionMask part, std::size_t n, const Draw& draw) {
   if (part.empty()) return draw(n);
   std::size_t left = draw(
-      static_cast<std::size_t>(std::ranges::count_if(part, [](auto one) { return one != 0; })));
+      static_cast<std::size_t>(std::ranges::count_if(part, [](auto entry) { return entry != 0; })));
   std::size_t action = 0;
   while (part[action] == 0 || left-- > 0) ++action;
   return action;

@@ -1,4 +1,4 @@
-/// How an agent's actions become those of a task, and back.
+/// Conversions between an agent's actions and those of its task.
 #pragma once
 
 #include <algorithm>
@@ -91,9 +91,9 @@ class Actions {
   /// The value of a box at a fractional index, index + offset; discrete actions ignore the offset.
   double beside_index(std::size_t index, double offset, std::size_t d) const noexcept {
     if (config_.discrete || n_actions_[d] == 1) return of_index(index, d);
-    const double part =
+    const double share =  // of the way from low to high
         (static_cast<double>(index) + offset) / static_cast<double>(n_actions_[d] - 1);
-    return rounded(config_.low[d] + (config_.high[d] - config_.low[d]) * part, d);
+    return rounded(config_.low[d] + (config_.high[d] - config_.low[d]) * share, d);
   }
   /// The action of a number in [-1, 1] in dimension d.
   double of_normalized(double action, std::size_t d) const noexcept {
@@ -102,10 +102,10 @@ class Actions {
   }
   /// The index of an action that can be taken, or of the nearest one to it.
   std::size_t index_of(double action, std::size_t d) const noexcept {
-    const double place = action - config_.low[d];
-    if (config_.discrete) return static_cast<std::size_t>(place);
-    const double part = place / (config_.high[d] - config_.low[d]);
-    return static_cast<std::size_t>(std::nearbyint(part * static_cast<double>(n_actions_[d] - 1)));
+    const double distance = action - config_.low[d];
+    if (config_.discrete) return static_cast<std::size_t>(distance);
+    const double share = distance / (config_.high[d] - config_.low[d]);
+    return static_cast<std::size_t>(std::nearbyint(share * static_cast<double>(n_actions_[d] - 1)));
   }
 
   /// Converts an agent's action, an index or a number in [-1, 1] for each dimension, to the units

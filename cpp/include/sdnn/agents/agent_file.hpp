@@ -47,13 +47,14 @@ struct IsOptionals : std::false_type {};
 template <class T>
 struct IsOptionals<std::vector<std::optional<T>>> : std::true_type {};
 
+/// Returns a setting as JSON: null for a missing one, and the word of an enumerator.
 template <class Value>
 nlohmann::json json_of(const Value& value) {
   if constexpr (IsOptional<Value>::value) {
     return value ? json_of(*value) : nlohmann::json(nullptr);
   } else if constexpr (IsOptionals<Value>::value) {
     nlohmann::json list = nlohmann::json::array();
-    for (const auto& one : value) list.push_back(json_of(one));
+    for (const auto& item : value) list.push_back(json_of(item));
     return list;
   } else if constexpr (std::is_enum_v<Value>) {
     return words_of(value).at(static_cast<std::size_t>(value));
@@ -62,10 +63,12 @@ nlohmann::json json_of(const Value& value) {
   }
 }
 
+/// Throws std::invalid_argument with the value, of which long ones are cut to a line.
 [[noreturn]] inline void refuse(const std::string& name, const std::string& expected,
                                 const nlohmann::json& value) {
   std::string shown = value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-  if (shown.size() > 60) shown = shown.substr(0, 57) + "...";
+  constexpr std::size_t kMostShown = 60;
+  if (shown.size() > kMostShown) shown = shown.substr(0, kMostShown - 3) + "...";
   throw std::invalid_argument(name + " must be " + expected + ", got " + shown);
 }
 
@@ -206,7 +209,7 @@ inline ControllerConfig controller_config_in(const nlohmann::json& description) 
     config.approximator = config_from_json<Approximator>(approximator, "approximator");
     config.learning = config_from_json<Learning>(learning, "learning");
   };
-  switch (kind) {
+  switch (kind) {  // the order of kAgentKinds
     case 0:
       read(approximators::SDNNCConfig(), QLearningConfig());
       break;
@@ -272,7 +275,7 @@ class AgentFile {
   Controller controller;
 
  private:
-  static constexpr std::string_view kOfTraining = "training.";
+  static constexpr std::string_view kOfTraining = "training.";  // names of a training's tensors
 
   AgentFile(core::FileContent content, const std::string& name)
       : controller(controller_in(content, name)), content_(std::move(content)) {}

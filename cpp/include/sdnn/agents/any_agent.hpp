@@ -85,6 +85,7 @@ inline std::size_t n_actions_in_box(const AnyApproximatorConfig& config) {
 
 namespace detail {
 
+/// Returns base^exponent, or a number of at least 1e300 if it is larger.
 inline double power(int base, int exponent) {
   double product = 1.0;
   for (int i = 0; i < exponent && product < 1e300; ++i) product *= base;

@@ -315,7 +315,8 @@ class Controller : public WithRates<Controller> {
   friend class WithRates<Controller>;
   struct PrivateTag {};
 
-  static constexpr double kCaution = 1.5;  // factor of evidence, as inputs are tested repeatedly
+  /// Factor of the evidence that inputs need after the warm-up, where they are tested repeatedly.
+  static constexpr double kCaution = 1.5;
 
   Controller(ControllerConfig config, std::vector<coding::PatternTable> tables, PrivateTag)
       : config_(std::move(config)),

@@ -1,4 +1,4 @@
-/// The duration of a transition, and what a discount becomes in it.
+/// The duration of a transition, and the discount over it.
 #pragma once
 
 #include <algorithm>

@@ -14,7 +14,7 @@ namespace sdnn::agents {
 template <class Episode>
 class Episodes {
  public:
-  /// The most environments of an agent.
+  /// The largest number of environments of an agent.
   static constexpr std::size_t kMost = std::size_t{1} << 14;
 
   explicit Episodes(Episode first) { episodes_.push_back(std::move(first)); }

@@ -1,4 +1,4 @@
-/// The policy: the best action, or with probability epsilon any.
+/// The policy: the best action, or with probability epsilon a random one.
 #pragma once
 
 #include <Eigen/Core>
@@ -105,7 +105,7 @@ class EpsilonGreedy {
   bool may_explore(int step) const noexcept {
     return step >= config_.n_greedy_steps && config_.epsilon > 0.0;
   }
-  /// Whether step number `step` of an episode is to take a random action: drawn anew.
+  /// Draws whether step number `step` of an episode takes a random action.
   bool explores(int step) noexcept {
     return may_explore(step) && exploration_.uniform() < config_.epsilon;
   }
@@ -125,7 +125,7 @@ class EpsilonGreedy {
   /// whose number is at least `least` tie with the best one.
   template <class Number>
   std::size_t best_action(std::span<const Number> numbers, Number least, core::Random& ties) const {
-    return one_of(numbers, least, ties);
+    return select_by_tie_rule(numbers, least, ties);
   }
   /// The stream that breaks ties in learning, or in evaluation.
   core::Random& ties(bool explore) noexcept { return explore ? ties_ : evaluation_ties_; }
@@ -152,12 +152,13 @@ class EpsilonGreedy {
   std::size_t greedy(std::span<const Value> values, core::Random& ties) const {
     const Value best = best_value(values);
     core::require(!std::isnan(best), "values", "numbers", best);
-    return one_of(values, static_cast<Value>(best - config_.tie_tolerance), ties);
+    return select_by_tie_rule(values, static_cast<Value>(best - config_.tie_tolerance), ties);
   }
 
   /// Returns the index of a value that is at least `least`, selected by the tie rule.
   template <class Value>
-  std::size_t one_of(std::span<const Value> values, Value least, core::Random& ties) const {
+  std::size_t select_by_tie_rule(std::span<const Value> values, Value least,
+                                 core::Random& ties) const {
     switch (config_.tie_rule) {
       case TieRule::lowest:
         return nth_of(values, least, 0);
@@ -180,7 +181,7 @@ class EpsilonGreedy {
   /// n.
   template <class Value>
   static std::size_t nth_of(std::span<const Value> values, Value least, std::uint64_t n) noexcept {
-    constexpr std::size_t kAtOnce = 64;
+    constexpr std::size_t kAtOnce = 64;  // counts of whole blocks are vectorized
     std::size_t i = 0;
     for (; i + kAtOnce < values.size(); i += kAtOnce) {
       const std::uint64_t n_here = count_of(values.subspan(i, kAtOnce), least);

@@ -88,7 +88,7 @@ class FixedRate {
     return start_ + static_cast<double>(tick) / hz_;
   }
 
-  /// Notes that tick_ has passed, and finds the next one to come.
+  /// Counts a miss of tick_, and moves on to the first tick that is not before `now`.
   void skip(double now) {
     ++n_misses_;
     worst_lateness_ = std::max(worst_lateness_, now - time_of(tick_));

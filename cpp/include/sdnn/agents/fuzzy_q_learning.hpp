@@ -74,7 +74,7 @@ class FuzzyQLearning {
     workspace_ = workspace();
     last_action_.resize(n_dimensions());
   }
-  /// With actions of one dimension.
+  /// Takes the rules of an agent with actions of one dimension.
   FuzzyQLearning(approximators::FuzzyRules rules, const FuzzyQLearningConfig& config,
                  std::uint64_t seed)
       : FuzzyQLearning(detail::only(std::move(rules)), config, seed) {}
@@ -119,7 +119,7 @@ class FuzzyQLearning {
     return workspace_.action;
   }
 
-  /// The number of the first dimension: actions are in [-1, 1].
+  /// The number in [-1, 1] of the first dimension.
   double normalized_action(Action action) const noexcept { return action.front(); }
 
   /// Returns the action of the last exploring act in an environment, valid until the next call.

@@ -197,7 +197,7 @@ class HistoryFilter {
            (!is_none() && memory.size() == n && core::are_finite(memory));
   }
 
-  /// Lists the kind, which `serialize` does not: other parts need it before.
+  /// Lists the kind separately from `serialize`, because other parts of a state need it first.
   template <class Archive>
   static void serialize_kind(History& kind, Archive& archive) {
     auto number = static_cast<std::int32_t>(kind);
@@ -232,11 +232,11 @@ class HistoryFilter {
   }
 
  private:
-  static constexpr double kLeastImprovement = 0.1335;  // of the observer: log(8 / 7)
-  static constexpr double kLeastShare = 0.2;           // of changes, explained by differences
-  static constexpr double kFastRate = 0.5, kSlowRate = 0.2;
-  static constexpr double kHeadroom = 1.5;
-  static constexpr double kLeastDifference = 1e-9;
+  static constexpr double kLeastImprovement = 0.1335;        // of the observer: log(8 / 7)
+  static constexpr double kLeastShare = 0.2;                 // of changes, explained by differences
+  static constexpr double kFastRate = 0.5, kSlowRate = 0.2;  // of the two running averages
+  static constexpr double kHeadroom = 1.5;          // of the largest difference in the experience
+  static constexpr double kLeastDifference = 1e-9;  // not 0, as differences are divided by it
 
   bool is_number(std::size_t i) const noexcept { return n_symbols_[i] == 0; }
   std::size_t n_numbers() const {
@@ -295,7 +295,7 @@ class HistoryFilter {
     const double change = first - second;
     return circular_[i] ? change - std::round(change) : change;
   }
-  /// Finds the differences that states show as 1: the largest of the experience, and some more.
+  /// Finds the differences that states encode as 1: kHeadroom times the largest in the experience.
   void find_largest_differences(const RandomExperience& experience) {
     largest_.assign(n_observed(), kLeastDifference);
     for (std::size_t k = 0; k < experience.states.size(); ++k) {
@@ -321,8 +321,8 @@ class HistoryFilter {
     } else if (kind_ == History::differences) {
       for (std::size_t i = 0; i < n_observed(); ++i) {
         if (!is_number(i)) continue;
-        const double part = difference(inputs[i], last[i], i) / largest_[i];
-        state[next++] = (std::clamp(part, -1.0, 1.0) + 1.0) / 2.0;
+        const double scaled = difference(inputs[i], last[i], i) / largest_[i];
+        state[next++] = (std::clamp(scaled, -1.0, 1.0) + 1.0) / 2.0;
       }
     } else {
       for (std::size_t k = 0; k < memory.size(); ++k) {
@@ -335,7 +335,7 @@ class HistoryFilter {
   std::vector<int> n_symbols_;
   [[maybe_unused]] std::size_t n_dimensions_ = 0;  ///< of actions
   History kind_ = History::none;
-  std::vector<double> largest_ = {};  ///< differences, in which a state's input is 1
+  std::vector<double> largest_ = {};  ///< differences that a state encodes as 1
   detail::Observer observer_ = {};
 };
 

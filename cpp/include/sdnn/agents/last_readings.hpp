@@ -1,4 +1,4 @@
-/// The last readings of an agent's sensors, where missing ones are replaced by them.
+/// The last readings of an agent's sensors, which can replace missing ones.
 #pragma once
 
 #include <cmath>
@@ -49,7 +49,8 @@ class LastReadings {
     return {before, filled(next_observation, before, next_held_)};
   }
 
-  /// Notes what `filled` gave last: an observation in `room`, or those of a transition.
+  /// Stores the last result of `filled`: an observation in `room`, or (note_step) the next one of a
+  /// transition.
   void note(const std::vector<double>& room, std::size_t environment, bool is_greedy) {
     if (!is_held_) return;
     if (last_.size() <= environment) last_.resize(environment + 1);

@@ -1,4 +1,4 @@
-/// The latest transitions at some times, to look again for inputs that matter.
+/// The latest transitions at some times, to test again which inputs are relevant.
 #pragma once
 
 #include <cstddef>
@@ -23,8 +23,8 @@ class LatestTransitions {
   }
   void begin_episode(std::size_t environment) { latest_.begin_episode(environment); }
 
-  /// Counts a transition, and remembers it if its number is one of those that are looked at.
-  /// Returns whether all n_steps are remembered: then look at them, and call `forget`.
+  /// Counts a transition, and stores it if it is one of the n_steps before the next of these times.
+  /// Returns whether all n_steps are stored; the caller then tests them and calls `forget`.
   bool learn(const WarmUp::Step& step) {
     const bool is_noted = n_seen_ >= next_time() - n_steps_;
     ++n_seen_;
@@ -51,7 +51,7 @@ class LatestTransitions {
  private:
   static constexpr std::uint64_t kMostSeen = std::uint64_t{1} << 62;
 
-  /// The next of these times, in transitions.
+  /// The next of the times 2 n, 4 n, 8 n, ..., as a number of transitions.
   std::uint64_t next_time() const noexcept {
     std::uint64_t time = 2 * n_steps_;
     while (time <= n_seen_) time *= 2;

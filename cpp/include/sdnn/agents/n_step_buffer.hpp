@@ -43,7 +43,7 @@ class NStepBuffer {
     return n_steps_ == 0 || std::ranges::equal(state, next_state_);
   }
 
-  /// Requires room for it, and shapes as in the constructor.
+  /// Adds the newest step. Requires that the buffer is not full, and shapes as in the constructor.
   void add(std::span<const double> state, std::span<const std::size_t> action, double reward,
            std::span<const double> next_state, double dt = 1.0) noexcept {
     assert(!is_full());

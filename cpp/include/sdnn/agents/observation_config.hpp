@@ -15,10 +15,10 @@ namespace sdnn::agents {
 /// Selects how states depend on the observations before the present one.
 enum class History {
   none,         ///< nothing
-  differences,  ///< the difference of each input from the last observation, a further input
-  averages,     ///< two running averages of each input, further inputs
+  differences,  ///< an additional input for each: its difference from the last observation
+  averages,     ///< two additional inputs for each: running averages
   observer,     ///< estimates in place of the inputs; see detail::Observer
-  automatic,    ///< what the transitions of the warm-up call for
+  automatic,    ///< the kind that fits the transitions of the warm-up, see HistoryFilter
 };
 constexpr std::array<std::string_view, 5> words_of(History) noexcept {
   return {"none", "differences", "averages", "observer", "auto"};

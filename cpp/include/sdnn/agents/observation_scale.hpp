@@ -1,4 +1,4 @@
-/// From what is observed to what an agent sees: numbers in [0, 1].
+/// The conversion of observations to states, numbers in [0, 1].
 #pragma once
 
 #include <algorithm>
@@ -41,7 +41,7 @@ enum class ObservedKind { variable, angle, circular, symbol };
 struct ObservedInput {
   ObservedKind kind;
   std::size_t first;
-  std::size_t second;  ///< of an angle; how many variables encode a symbol
+  std::size_t second;  ///< the sine of an angle; or the number of variables of a symbol
 };
 
 /// Scales observations to states in [0, 1], with a range for each observed variable.

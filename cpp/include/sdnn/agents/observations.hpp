@@ -1,4 +1,4 @@
-/// How observations become states: which ranges are known, and how the others are found.
+/// The conversion of observations to states, with ranges that are known or fitted.
 #pragma once
 
 #include <algorithm>
@@ -105,7 +105,7 @@ class Observations {
   }
   /// Whether inputs may be fewer than variables that are no symbols.
   bool may_have_fewer_inputs() const { return may_find_pairs() || config_.relevant_only; }
-  /// How many symbols each input may be; 0: it is a number.
+  /// The number of symbols of each input; 0 for an input that is a number.
   std::vector<int> n_symbols() const {
     std::vector<int> n_symbols;
     for (const ObservedInput& input : inputs_) {
@@ -121,7 +121,7 @@ class Observations {
   /// Whether each input has a pattern for missing readings; a symbol's is its last one.
   bool codes_missing() const noexcept { return config_.missing == Missing::code; }
 
-  /// How many states there are where an observation is one symbol; else 0.
+  /// The number of states if an observation is a single symbol; else 0.
   std::size_t n_states() const noexcept {
     const bool is_symbol =
         !config_.symbols.empty() && index(config_.symbols.front()[1]) == n_variables();
@@ -257,12 +257,12 @@ class Observations {
   };
   using Pairs = std::vector<std::vector<int>>;
 
-  static constexpr double kMuchWider = 2.0;
-  static constexpr double kRounding = 1e-6;  // relative, of single precision and some more
-  static constexpr std::size_t kFewInputs = 4;
-  static constexpr std::size_t kAlwaysKept = 2;
-  static constexpr std::size_t kRare = 20;
-  static constexpr double kLargest = 1e300;
+  static constexpr double kMuchWider = 2.0;  // ratio of widths from which ranges are narrowed
+  static constexpr double kRounding = 1e-6;  // relative differences that single precision can cause
+  static constexpr std::size_t kFewInputs = 4;   // more inputs are not narrowed
+  static constexpr std::size_t kAlwaysKept = 2;  // inputs that are kept without a selection
+  static constexpr std::size_t kRare = 20;       // one in 20 observations at each end is rare
+  static constexpr double kLargest = 1e300;      // end of a range, so that its width is finite
 
   static bool is_unknown(double x) noexcept { return std::isnan(x); }
   bool is_variable(std::int64_t i) const noexcept {
@@ -275,7 +275,7 @@ class Observations {
                   "of variables below " + std::to_string(n_variables()), variable);
   }
 
-  /// Gives a variable a role; each has one only.
+  /// Gives a variable its role. Throws std::invalid_argument if it has another one already.
   void claim(Role role, int variable, const char* name) {
     require_variable(name, variable);
     Role& present = roles_[index(variable)];
@@ -422,14 +422,14 @@ class Observations {
   std::size_t least_inputs_;
   bool repeats_input_ = true;
   std::vector<std::size_t> n_bins_;
-  std::vector<Role> roles_;  ///< as the configuration has them
+  std::vector<Role> roles_;  ///< roles by the configuration
   bool needs_fit_ = false;
   std::optional<RunningRanges> running_;
   Ranges ranges_;
   Pairs pairs_;
   std::vector<ObservedInput> inputs_;
   std::vector<std::int32_t> kept_;  ///< numbers of the inputs that were kept, if some were not
-  std::size_t n_first_ = 0;         ///< of these, how many there were at first
+  std::size_t n_first_ = 0;         ///< the number of them before others were added
   std::optional<ObservationScale> scale_;
 };
 

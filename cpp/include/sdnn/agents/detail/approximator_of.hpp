@@ -28,7 +28,7 @@ namespace sdnn::agents::detail {
 /// set.
 inline bool is_table(const ControllerConfig& config, const Observations& observations,
                      const std::vector<coding::PatternTable>& tables) noexcept {
-  constexpr std::size_t kMostStates = 1536;
+  constexpr std::size_t kMostStates = 1536;  // a table of n states has 2 n columns, others 3,072
   const auto* const linear = std::get_if<approximators::LinearSDNNConfig>(&config.approximator);
   const std::size_t n = observations.n_states();
   return linear != nullptr && linear->n_pattern_units == 0 && tables.empty() && n >= 2 &&
@@ -90,10 +90,10 @@ inline AnyApproximatorConfig approximator_of(const ControllerConfig& config,
                                              const Observations& observations,
                                              const HistoryFilter& history, const Actions& actions,
                                              const std::vector<coding::PatternTable>& tables) {
-  const auto fill_in_sizes = [&](auto& own) {
-    own.n_inputs = static_cast<int>(history.n_inputs());
+  const auto fill_in_sizes = [&](auto& sized) {
+    sized.n_inputs = static_cast<int>(history.n_inputs());
     if (config.action.discrete && actions.n_dimensions() == 1 && !is_fuzzy(config.approximator)) {
-      own.n_actions = static_cast<int>(actions.n_actions().front());
+      sized.n_actions = static_cast<int>(actions.n_actions().front());
     }
   };
   const auto fill_in_code = [&](auto& own) {
@@ -101,7 +101,7 @@ inline AnyApproximatorConfig approximator_of(const ControllerConfig& config,
       const auto circular = history.is_none() ? observations.circular() : history.circular();
       const auto n_symbols = history.is_none() ? observations.n_symbols() : history.n_symbols();
       const auto has = [](const auto& list) {
-        return std::ranges::any_of(list, [](auto one) { return one != 0; });
+        return std::ranges::any_of(list, [](auto number) { return number != 0; });
       };
       if (has(circular) && own.circular.empty()) own.circular = circular;
       if (has(n_symbols) && own.n_symbols.empty()) own.n_symbols = n_symbols;

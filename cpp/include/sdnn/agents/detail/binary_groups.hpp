@@ -42,9 +42,11 @@ inline BinaryInput binary_input(std::span<const double> states, std::span<const 
 
 /// Three binary inputs or more.
 struct BinaryGroup {
-  std::vector<std::size_t> inputs = {};     ///< in ascending order
-  std::vector<std::uint16_t> symbols = {};  ///< before each step: which input is on, 1 and more;
-  std::vector<std::uint16_t> next_symbols = {};  ///< after it. 0: none. Empty: several can be on.
+  std::vector<std::size_t> inputs = {};  ///< in ascending order
+  /// The place of the input that is on, counted from 1, before and after each step; 0 if none is.
+  /// Both are empty in the last group, where several inputs can be on.
+  std::vector<std::uint16_t> symbols = {};
+  std::vector<std::uint16_t> next_symbols = {};
 };
 
 /// Groups of three or more binary inputs.
@@ -107,6 +109,7 @@ inline double steering(const BinaryGroup& group, std::span<const std::uint8_t> a
                                group.next_symbols[t]);
     }
     std::ranges::sort(transitions);
+    // Equal transitions are neighbours now, within those of one condition, symbol and action.
     double sum = 0.0, squares = 0.0, n_known = 0.0, n_same = 0.0;
     for (std::size_t t = 0; t < transitions.size(); ++t) {
       const auto& [symbol, action, next] = transitions[t];

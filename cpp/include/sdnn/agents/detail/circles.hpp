@@ -12,14 +12,14 @@
 
 namespace sdnn::agents::detail {
 
-inline constexpr double kNearCircle = 1e-3;  // single precision and some rounding
-// Thresholds for points around a circle. With noise of a tenth of the range, the squares of both
-// coordinates have a correlation of -0.65. A radius that really moves has an autocorrelation above
-// 0.5.
+inline constexpr double kNearCircle = 1e-3;  // allows for single precision and some rounding
+// Thresholds for points around a circle: of |E[x^2 + y^2] - 1|, of minus the correlation of x^2 and
+// y^2, and of the autocorrelation of the radius. With noise of a tenth of the range the correlation
+// is -0.65. A radius that really moves has an autocorrelation above 0.5.
 inline constexpr std::size_t kFewest = 200;  // steps
 inline constexpr double kLargestBias = 0.15, kLeastOpposed = 0.5, kMostAlike = 0.2;
 
-/// The readings of a variable, shape (n, n_variables) row by row; 0 where there is none.
+/// Returns the finite readings of variable i, or {0} if it has none. Shape: seen (n, n_variables).
 inline std::vector<double> column(std::span<const double> seen, std::size_t n_variables,
                                   std::size_t i) {
   std::vector<double> values;
@@ -76,6 +76,7 @@ inline bool is_around_circle(const std::vector<double>& cosines, const std::vect
     return sum / static_cast<double>(count);
   };
   const auto square = [](double x) { return x * x; };
+  // x and y are the mean squares of both coordinates, and dx and dy deviations from them.
   const double x = mean_of(2 * n, [&](std::size_t t) { return square(cosines[t]); });
   const double y = mean_of(2 * n, [&](std::size_t t) { return square(sines[t]); });
   if (!(std::abs(x + y - 1.0) < kLargestBias)) return false;
@@ -86,8 +87,9 @@ inline bool is_around_circle(const std::vector<double>& cosines, const std::vect
   const double yy = mean_of(2 * n, [&](std::size_t t) { return square(dy(t)); });
   const double xy = mean_of(2 * n, [&](std::size_t t) { return dx(t) * dy(t); });
   const double rr = mean_of(2 * n, [&](std::size_t t) { return square(radius(t)); });
-  const double alike = mean_of(n, [&](std::size_t t) { return radius(t) * radius(n + t); });
-  return -xy > kLeastOpposed * std::sqrt(xx * yy) && std::abs(alike) < kMostAlike * rr;
+  const double autocovariance =
+      mean_of(n, [&](std::size_t t) { return radius(t) * radius(n + t); });
+  return -xy > kLeastOpposed * std::sqrt(xx * yy) && std::abs(autocovariance) < kMostAlike * rr;
 }
 
 }  // namespace sdnn::agents::detail

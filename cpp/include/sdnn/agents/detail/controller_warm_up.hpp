@@ -30,7 +30,8 @@ namespace sdnn::agents {
 
 namespace detail {
 
-/// Transitions, one environment after the other. A reward that is not learned counts as 0.
+/// Returns transitions with scaled states, one environment after the other. The reward of a
+/// transition that is not learned, because it is far too large, counts as 0.
 inline RandomExperience experience_of(const Observations& fitted, const WarmUp& transitions,
                                       std::size_t n_dimensions) {
   std::vector<std::size_t> order(transitions.size());
@@ -190,7 +191,8 @@ inline void Controller::end_warm_up(double headroom) {
   watch();
 }
 
-/// Looks for inputs that matter later, where some are left out and can be added.
+/// Starts to store the latest transitions, in which inputs that were left out may prove relevant.
+/// Only Q(lambda) without a history, custom patterns or a limit of pairs can add inputs.
 inline void Controller::watch() {
   latest_.reset();
   const auto* const linear = std::get_if<approximators::LinearSDNNConfig>(&approximator_);
@@ -204,6 +206,7 @@ inline void Controller::watch() {
   latest_->set_n_environments(n_environments());
 }
 
+/// Tests the latest transitions, and adds the inputs that are relevant in them to the agent.
 inline void Controller::add_inputs() {
   const std::vector<bool> kept = observations_.kept_inputs();
   const RandomExperience latest = detail::experience_of(observations_.with_all_inputs(),

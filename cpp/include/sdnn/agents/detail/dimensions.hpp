@@ -39,7 +39,8 @@ class Parts : public std::vector<Part> {
   ~Parts() = default;
 };
 
-/// Returns the only part of an agent with actions of one dimension, without a copy.
+/// Returns a vector with a single part, for agents with actions of one dimension. An initializer
+/// list would copy the part.
 template <class Part>
 std::vector<Part> only(Part part) {
   std::vector<Part> parts;

@@ -27,7 +27,7 @@ class ErrorScale {
   /// Divides an error, an integer in units of 2^exponent, by the root mean square of the errors so
   /// far, this one included. The quotient has 12 fractional bits and is clipped to [-3, 3].
   std::int32_t normalized(std::int64_t error, std::int32_t exponent) noexcept {
-    // The mean square is converted to the unit of this error.
+    // The mean square is converted to the unit of this error, by 4 for each power of 2.
     for (; exponent_ < exponent && mean_square_ > 0; ++exponent_) mean_square_ >>= 2;
     for (; exponent_ > exponent && mean_square_ > 0; --exponent_) {
       mean_square_ = std::min(mean_square_ << 2, kLargestMean);
@@ -43,8 +43,8 @@ class ErrorScale {
     }
     const auto root = static_cast<std::int64_t>(
         square_root(static_cast<std::uint64_t>(mean_square_ >> kFractionBits)));
-    const auto quotient =
-        std::min((size << 12) / std::max<std::int64_t>(root, 1), std::int64_t{3} << 12);
+    const auto quotient = std::min((size << kQuotientBits) / std::max<std::int64_t>(root, 1),
+                                   kLargestQuotient << kQuotientBits);
     return static_cast<std::int32_t>(error < 0 ? -quotient : quotient);
   }
 
@@ -63,13 +63,16 @@ class ErrorScale {
   }
 
  private:
-  static constexpr int kLowBits = 8;
-  static constexpr int kFractionBits = 10;
+  static constexpr int kLowBits = 8;        ///< dropped from errors, so that squares fit
+  static constexpr int kFractionBits = 10;  ///< of the mean square, so that a 1024th of it counts
+  static constexpr int kQuotientBits = 12;
+  static constexpr std::int64_t kLargestQuotient = 3;
+  /// Errors have at most 33 bits, and thus sizes 25; a square has 50 bits and 10 of fraction.
   static constexpr std::int64_t kLargestSize = (std::int64_t{1} << 25) - 1;
   static constexpr std::int64_t kLargestMean = std::int64_t{1} << 60;
-  static constexpr std::int64_t kWindow = 1024;
+  static constexpr std::int64_t kWindow = 1024;  ///< errors in the running mean
 
-  std::int64_t mean_square_ = 0;  ///< of sizes, with 10 fractional bits
+  std::int64_t mean_square_ = 0;  ///< of error >> kLowBits, with 10 fractional bits
   std::int64_t n_errors_ = 0;
   std::int32_t exponent_ = 0;  ///< of the unit of errors
 };

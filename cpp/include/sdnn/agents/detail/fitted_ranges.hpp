@@ -1,4 +1,4 @@
-/// How ranges of observations are fitted to what was observed.
+/// Fits the ranges of observations to observed values.
 #pragma once
 
 #include <algorithm>
@@ -32,6 +32,8 @@ inline void Observations::fit(std::span<const double> seen, double headroom) {
   take(ranges, pairs);
 }
 
+/// Replaces the range of variable i by a fitted one if it is much wider than the observed values
+/// and contains them.
 inline void Observations::narrow(Ranges& ranges, std::size_t i, const std::vector<double>& seen,
                                  double headroom) {
   const auto [least, most] = std::ranges::minmax(seen);

@@ -156,6 +156,7 @@ class FuzzyDimension {
   /// Returns the rules. Throws std::length_error before memory is allocated if the rules that fire
   /// and their traces need too much: the number of rules that fire doubles with every input.
   approximators::FuzzyRules with_room(approximators::FuzzyRules rules) const {
+    // A fired rule and its truth value, twice (episode and workspace), its action, and its traces.
     const double per_rule = 2.0 * (sizeof(std::size_t) + sizeof(double)) + sizeof(std::size_t) +
                             static_cast<double>(trace_lifetime() + 1) * sizeof(Trace);
     core::require_table_bytes("n_inputs or trace_decay", "rules that fire and their traces",
@@ -257,7 +258,8 @@ class FuzzyDimension {
 
   static constexpr double kSlowestFading = 0.99;  // limits the memory for traces
   static constexpr double kLargest = std::numeric_limits<float>::max();
-  static constexpr double kLargeStep = 1e28;  // smaller ones move no value that is near kLargest
+  /// A smaller step is less than half the distance of floats near kLargest, so it cannot exceed it.
+  static constexpr double kLargeStep = 1e28;
 
   // sum value(i) alpha_i / sum alpha_i over the fired rules i, in their order.
   template <class Value>

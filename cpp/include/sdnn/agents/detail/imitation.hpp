@@ -1,4 +1,4 @@
-/// The order of values that imitation learns.
+/// Errors by which imitation makes the value of the teacher's action the highest.
 #pragma once
 
 #include <algorithm>
@@ -30,6 +30,8 @@ inline void separate(const approximators::LinearSDNN& readout,
       if (a != teacher && sums[a] > sums[other]) other = a;
     }
     if (sums.size() > 1 && sums[other] + margin > sums[teacher]) {
+      // Each of the two actions moves half of the way. Q(s, a) sums over dimensions, and a step
+      // divides an error by the weights of all of them, hence the factor.
       const std::int64_t error = (sums[other] + margin - sums[teacher]) * n_dimensions / 2;
       for (std::size_t row = first_row; row < first_row + window; ++row) {
         errors[row + teacher] += error;

@@ -11,7 +11,8 @@
 namespace sdnn::agents::detail {
 
 /// Returns the weights, shape (n_features, n_targets), that fit n rows of features to n rows of
-/// targets by least squares, with a ridge of a millionth. Requires that n > 0 divides the sizes.
+/// targets by least squares, with a ridge of a millionth of the largest diagonal entry. Requires
+/// that n > 0 divides the sizes.
 ///
 /// Source: the normal equations, by a Cholesky decomposition; Golub, G., Van Loan, C. (1996), 4.2.
 inline std::vector<double> least_squares(const std::vector<double>& features,
@@ -32,8 +33,8 @@ inline std::vector<double> least_squares(const std::vector<double>& features,
   for (std::size_t i = 0; i < n_features; ++i) {
     largest = std::max(largest, matrix[i * n_features + i]);
   }
-  const double ridge = kRidge * std::max(largest, 1e-300);
-  for (std::size_t i = 0; i < n_features; ++i) {
+  const double ridge = kRidge * std::max(largest, 1e-300);  // not 0, even for features of 0
+  for (std::size_t i = 0; i < n_features; ++i) {            // the Cholesky factor, in place
     for (std::size_t j = 0; j <= i; ++j) {
       double& entry = matrix[i * n_features + j];
       if (i == j) entry += ridge;
@@ -44,7 +45,7 @@ inline std::vector<double> least_squares(const std::vector<double>& features,
           i == j ? std::sqrt(std::max(entry, ridge * kRidge)) : entry / matrix[j * n_features + j];
     }
   }
-  for (std::size_t k = 0; k < n_targets; ++k) {
+  for (std::size_t k = 0; k < n_targets; ++k) {  // forward, then backward substitution
     for (std::size_t i = 0; i < n_features; ++i) {
       double& weight = weights[i * n_targets + k];
       for (std::size_t j = 0; j < i; ++j) {

@@ -116,6 +116,7 @@ class LinearTD {
     if (!readout_.exponent()) return;
     const std::int32_t exponent = *readout_.exponent();
     const std::int64_t n_weights = readout_.n_weights_of(episodes.of(0).present.code());
+    // A sum of rewards is at most reward / (1 - gamma); `rest` is 1 - gamma. Sizes are exponents.
     const std::int64_t rest = std::max<std::int64_t>(kDiscountOne - usual_discount_, 1);
     const int least_bits =
         Readout::most_bits_of(n_weights) - (kDiscountBits - floor_log2(rest)) - kImplausibleBits;
@@ -132,8 +133,8 @@ class LinearTD {
  private:
   static constexpr int kDiscountBits = 15;
   static constexpr std::int64_t kDiscountOne = std::int64_t{1} << kDiscountBits;
-  static constexpr int kRoomBits = 8;  ///< that a smaller unit leaves for larger weights
-  static constexpr int kImplausibleBits = 10;
+  static constexpr int kRoomBits = 8;          ///< that a smaller unit leaves for larger weights
+  static constexpr int kImplausibleBits = 10;  ///< of 1,024 times the largest plausible value
 
   std::int64_t discount_of(double dt) const noexcept {
     return std::lround(discount_over(discount_, dt) * static_cast<double>(kDiscountOne));

@@ -150,20 +150,22 @@ class Observer {
     }
   };
 
+  /// Candidates from exact to very noisy sensors, each about 0.7 times the one before.
   static constexpr double kGains[] = {1.0, 0.7, 0.5, 0.35, 0.25, 0.175, 0.125, 0.09};
   static constexpr double kDrifts[] = {3.0, 1.0, 0.3, 0.1, 0.03};
   static constexpr double kLargestGain = 100.0;
-  static constexpr int kRounds = 3, kRefinements = 4;
-  static constexpr std::size_t kMostTransitions = 20'000;
-  static constexpr std::size_t kMostLevels = 8;
-  static constexpr std::size_t kMostFeaturesWithProducts = 17;
-  static constexpr double kLeastExplained = 0.7;
-  static constexpr double kFarthest = 6.0;  // in deviations
-  static constexpr double kLargestChange = 3.0;
-  static constexpr double kLeastError = 1e-6;
-  static constexpr double kHeadroom = 0.25;
-  static constexpr double kLeastWidth = 1e-3;
-  static constexpr double kLeastDeviation = 1e-9;
+  static constexpr int kRounds = 3;                        // fits, each to the last one's estimates
+  static constexpr int kRefinements = 4;
+  static constexpr std::size_t kMostTransitions = 20'000;  // limits the time of a fit
+  static constexpr std::size_t kMostLevels = 8;            // more actions count as a number
+  static constexpr std::size_t kMostFeaturesWithProducts = 17;  // 17 * 18 / 2 = 153 products
+  static constexpr double kLeastExplained = 0.7;                // share, see share_of_last_changes
+  static constexpr double kFarthest = 6.0;       // of estimates from the mean, in deviations
+  static constexpr double kLargestChange = 3.0;  // of an estimate in a step, in deviations
+  static constexpr double kLeastError = 1e-6;    // added to squares, so that logarithms are finite
+  static constexpr double kHeadroom = 0.25;      // of ranges at each end, in widths
+  static constexpr double kLeastWidth = 1e-3;    // of a range, so that it can be divided by
+  static constexpr double kLeastDeviation = 1e-9;  // inputs with less count as constant
 
   /// Clips x to [low, high]. NaN, which damaged files can lead to, becomes low.
   static double within(double x, double low, double high) noexcept {
@@ -212,7 +214,8 @@ class Observer {
     }
   }
 
-  /// Finds how actions are features: by an indicator for each, or by their number if many differ.
+  /// Decides how actions become features: by an indicator for each, or by their number if many
+  /// differ.
   void find_actions(const RandomExperience& experience) {
     for (const std::vector<double>& actions : experience.actions) {
       std::vector<double> levels = actions;
@@ -399,7 +402,7 @@ class Observer {
   std::vector<bool> circular_;
   std::vector<double> means_, deviations_;   ///< of states
   std::vector<std::int32_t> n_levels_ = {};  ///< of each dimension; 1: an action is a number
-  std::vector<double> levels_ = {};   ///< actions that are told apart, or from which numbers count
+  std::vector<double> levels_ = {};   ///< actions with an indicator, or the zero of a number
   std::vector<double> weights_ = {};  ///< (n_features, n_inputs)
   std::vector<double> gains_ = {};    ///< (n_inputs, n_inputs)
   std::vector<double> low_ = {}, high_ = {};  ///< of estimates

@@ -18,9 +18,10 @@ namespace sdnn::agents::detail {
 /// The state of the present episode.
 struct QLambdaEpisode {
   approximators::LinearSDNN::Trace trace;
-  approximators::LinearSDNN::Workspace present;  ///< of state
-  approximators::LinearSDNN::Workspace next;     ///< of the state after it, or another
-  bool waits = false;  ///< the episode continues; with Sarsa, this transition is to be learned:
+  approximators::LinearSDNN::Workspace present;  ///< workspace of `state`
+  approximators::LinearSDNN::Workspace next;     ///< workspace of the next state, or of another
+  bool waits = false;  ///< the episode continues; with Sarsa, its last transition is pending
+  // The last transition, which Sarsa learns once the next action is known.
   std::vector<double> state;
   std::vector<std::size_t> action;
   double reward = 0.0;
@@ -28,7 +29,7 @@ struct QLambdaEpisode {
   std::vector<std::uint8_t> next_mask;
   std::int64_t old_value = 0;  ///< Q_old, in units
   double dt = 1.0;             ///< the duration of the transition that is to be learned
-  double trace_dt = 1.0;       ///< that of the one before, see LinearTD
+  double trace_dt = 1.0;       ///< the duration of the transition before, see LinearTD
   Exploration::Episode exploration;
 };
 
@@ -90,8 +91,9 @@ std::int64_t best_sum(const Readout& readout, typename Readout::Workspace& read,
   return total;
 }
 
-/// Returns the value of a schedule from `first` to `last` after n_done steps, as an integer with
-/// halves rounded up. The share n_done / (n_done + n_steps) of the way to `last` is done.
+/// Returns the value of a schedule from `first` to `last` after n_done steps, as an integer in
+/// units of 1 / one, with halves rounded up. The share n_done / (n_done + n_steps) of the way to
+/// `last` is done.
 inline std::int32_t scheduled(double first, double last, std::int64_t n_done, std::int64_t n_steps,
                               std::int32_t one) noexcept {
   const std::int64_t from = std::lround(first * one);

@@ -54,7 +54,7 @@ inline void softmax(std::span<const std::int64_t> preferences, ActionMask allowe
                     std::span<SoftmaxTerm> terms) noexcept {
   constexpr std::int64_t kLog2E = 1549082005;  // log2(e), in units of 2^-30
   constexpr std::int64_t kLn2 = 45426;         // ln(2), in units of 2^-16
-  constexpr std::int64_t kMostBits = std::int64_t{40} << kExponentBits;
+  constexpr std::int64_t kMostBits = std::int64_t{40} << kExponentBits;  // 2^-40 has weight 0
   std::int64_t best = INT64_MIN;
   for (std::size_t a = 0; a < terms.size(); ++a) {
     if (allows(allowed, a)) best = std::max(best, preferences[a]);

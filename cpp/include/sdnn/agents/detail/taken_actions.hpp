@@ -1,4 +1,4 @@
-/// Which actions were explored last.
+/// The last exploring actions.
 #pragma once
 
 #include <algorithm>
