@@ -1,4 +1,4 @@
-/// The RBF network without its product structure, for what that costs.
+/// An RBF network computed by its definition, without the product structure of RBFNetwork.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-/// Timing of a function call by call, so that whoever reads the times can take medians.
+/// Timing of each call of a function, so that medians can be taken.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace sdnn::tools {
 /// A duration for each repetition, in nanoseconds of std::chrono::steady_clock.
 using Times = std::vector<std::int64_t>;
 
-/// The most repetitions of one call.
+/// The largest number of repetitions in a measurement.
 inline constexpr int kMaxRepetitions = 1 << 24;
 
 /// Nanoseconds since some fixed point in the past.

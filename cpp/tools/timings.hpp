@@ -162,7 +162,7 @@ class AcrobotDecisions {
 
   const environments::Acrobot& acrobot() const noexcept { return acrobot_; }
 
-  /// Times of `n_repetitions` decisions; one in 50 starts at rest.
+  /// Times `n_repetitions` decisions; the acrobot starts at rest again after every 50.
   Times run(int n_repetitions) {
     double torque = 0.0;
     return time_each(
@@ -192,10 +192,9 @@ class AcrobotDecisions {
 ///
 /// States are uniform in [0, 1)^d and rewards in [-1, 1), both drawn from `seed`, in a single
 /// episode that does not terminate. Drawing and the first act are not timed, nor other programs'
-/// share of the processor. Give each call another
-/// seed, so that no state is in the agent's caches. Make an untimed call first, because an
-/// untrained agent can be faster. Throws std::invalid_argument unless n_repetitions is in [0,
-/// kMaxRepetitions], and the agent's errors.
+/// share of the processor. Give each call another seed, so that no state is in the agent's caches.
+/// Make an untimed call first, because an untrained agent can be faster. Throws
+/// std::invalid_argument unless n_repetitions is in [0, kMaxRepetitions], and the agent's errors.
 template <agents::Agent Agent>
 Times time_agent_steps(Agent& agent, int n_repetitions, std::uint64_t seed) {
   core::Random random(seed, core::Stream::exploration);

@@ -233,7 +233,7 @@ class AcrobotTrial {
     }
     in_decision_ = false;
     n_steps_ += steps_per_decision_;
-    if (n_steps_ > kStepsPerPoint) {  // a usual episode is over before
+    if (n_steps_ > kStepsPerPoint) {  // usual episodes, which begin at such a point, are shorter
       n_steps_ = 0.0;
       core::interruption_point();
     }
@@ -254,10 +254,10 @@ class AcrobotTrial {
   std::vector<TestRow> rows_;
   std::int64_t n_decisions_ = 0;
   int episode_ = 0;
-  bool is_test_ = false;  // the episode under way, or the next
+  bool is_test_ = false;  // whether the current episode, or else the next one, is a test episode
   bool in_episode_ = false;
-  bool in_decision_ = false;  // also after something was thrown there
-  TestRow row_ = {};          // of the episode under way, of learning or not
+  bool in_decision_ = false;  // still true after an exception within a decision
+  TestRow row_ = {};          // of the current learning or test episode
   double lambda_ = 0.0;
   Action action_ = {};
   double torque_ = 0.0;

@@ -16,9 +16,10 @@ namespace {
 using agents::QLearning;
 using approximators::SDNNC;
 
-/// An agent that records all calls by their first letters (of acts without exploration: g, of
-/// terminal transitions: t); its action is the number of acts before.
-class Witness {
+/// An agent that records calls as letters: b for begin_episode, a for an exploring and g for a
+/// greedy act, l for learn and t for learn of a terminated transition. Its action is the number of
+/// acts before.
+class RecordingAgent {
  public:
   struct Learned {
     std::vector<double> state;
@@ -48,18 +49,18 @@ class Witness {
 };
 
 TEST(TimeAgentSteps, EachStepLearnsTheTransitionToANewStateAndActsThere) {
-  Witness witness;
-  const Times times = time_agent_steps(witness, 3, 5);
+  RecordingAgent agent;
+  const Times times = time_agent_steps(agent, 3, 5);
   EXPECT_EQ(times.size(), 3U);
-  EXPECT_EQ(witness.calls, "balalala");
-  ASSERT_EQ(witness.learned.size(), 3U);
+  EXPECT_EQ(agent.calls, "balalala");
+  ASSERT_EQ(agent.learned.size(), 3U);
   core::Random random(5, core::Stream::exploration);
-  for (double& value : witness.states[0]) EXPECT_EQ(value, random.uniform());
+  for (double& value : agent.states[0]) EXPECT_EQ(value, random.uniform());
   for (std::size_t i = 0; i < 3; ++i) {
-    const auto& learned = witness.learned[i];
-    EXPECT_EQ(learned.state, witness.states[i]);
+    const auto& learned = agent.learned[i];
+    EXPECT_EQ(learned.state, agent.states[i]);
     EXPECT_EQ(learned.action, static_cast<int>(i));
-    EXPECT_EQ(learned.next_state, witness.states[i + 1]);
+    EXPECT_EQ(learned.next_state, agent.states[i + 1]);
     EXPECT_NE(learned.next_state, learned.state);
     for (const double value : learned.next_state) EXPECT_EQ(value, random.uniform());
     EXPECT_EQ(learned.reward, 2.0 * random.uniform() - 1.0);
@@ -67,21 +68,21 @@ TEST(TimeAgentSteps, EachStepLearnsTheTransitionToANewStateAndActsThere) {
 }
 
 TEST(TimeAgentSteps, BadNumbersAndNoRepetitionsDoNotChangeTheAgent) {
-  Witness witness;
-  EXPECT_THROW(time_agent_steps(witness, -1, 1), std::invalid_argument);
-  EXPECT_THROW(time_agent_steps(witness, kMaxRepetitions + 1, 1), std::invalid_argument);
-  EXPECT_TRUE(time_agent_steps(witness, 0, 1).empty());
-  EXPECT_EQ(witness.calls, "");
+  RecordingAgent agent;
+  EXPECT_THROW(time_agent_steps(agent, -1, 1), std::invalid_argument);
+  EXPECT_THROW(time_agent_steps(agent, kMaxRepetitions + 1, 1), std::invalid_argument);
+  EXPECT_TRUE(time_agent_steps(agent, 0, 1).empty());
+  EXPECT_EQ(agent.calls, "");
 }
 
-// Otherwise the memory of potentials would be what is timed.
+// With cached potentials the time would not be that of a pass over the weights.
 TEST(TimeAgentSteps, EveryStepOfALargeNetworkTakesAFullPass) {
   QLearning<SDNNC> agent(SDNNC({.n_inputs = 6}, 1), {}, 1);
   constexpr int kSteps = 100;
   time_agent_steps(agent, kSteps, 1);
   const auto n_full = agent.agent_workspace().networks.front().cache().counts().full;
   EXPECT_GE(n_full, kSteps - 2U);  // a new state may be near the last one
-  EXPECT_LE(n_full, kSteps + 1U);  // with the first act
+  EXPECT_LE(n_full, kSteps + 1U);  // the steps and the first act, which is not timed
 }
 
 }  // namespace

@@ -34,7 +34,7 @@ TEST(AcrobotDecisions, ContinuesThroughAllEpisodes) {
   AcrobotDecisions decisions({}, 1);
   EXPECT_EQ(decisions.n_integration_steps(), 50);  // of 0.02 s in a second
   EXPECT_EQ(decisions.run(120).size(), 120U);
-  EXPECT_EQ(decisions.acrobot().decisions(), 20);  // of the third episode of 50
+  EXPECT_EQ(decisions.acrobot().decisions(), 120 - 2 * 50);  // an episode has 50 decisions
   EXPECT_NE(decisions.acrobot().state()[0], 0.0);
   EXPECT_THROW(decisions.run(-1), std::invalid_argument);
 }

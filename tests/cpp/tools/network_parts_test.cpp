@@ -10,7 +10,8 @@ namespace {
 
 using approximators::SDNNC;
 
-constexpr int kActive = 30;  // n', the most units that a correction can change
+constexpr int kActive =
+    30;  // n', the number of units of a window, all that a correction can change
 
 SDNNC small_network() {
   return SDNNC(
@@ -29,7 +30,7 @@ TEST(NetworkParts, ATimedCorrectionChangesTheRequestedNumberOfUnits) {
   EXPECT_EQ(n_changed, kCorrected);
 }
 
-// A new state must mean a full pass: otherwise the pass is not what is timed.
+// A new state needs a full pass over the weights, whose time is to be measured.
 TEST(NetworkParts, AlmostAllNewStatesOfThePapersSizesTakeFullPasses) {
   NetworkParts parts(SDNNC({.n_inputs = 6}, 1), 1);
   constexpr int kStates = 200;

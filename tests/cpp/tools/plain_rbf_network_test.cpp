@@ -43,7 +43,7 @@ TEST(PlainRBFNetwork, LearnsLikeTheFactoredNetwork) {
   EXPECT_TRUE(std::ranges::equal(plain.network().weights(), factored.weights()));
 }
 
-/// A network with weights of several sizes and signs, learned from random targets.
+/// A network that has learned random targets in [-10, 10], so that its weights differ.
 Plain taught(const RBFNetworkConfig& config, int n_corrections) {
   Plain network(config);
   core::Random random(7, core::Stream::weights);
@@ -56,7 +56,7 @@ Plain taught(const RBFNetworkConfig& config, int n_corrections) {
   return network;
 }
 
-// Two algorithms: every joint basis against the product over the dimensions.
+// Compares the sum over all joint bases with the product over the dimensions.
 TEST(PlainRBFNetwork, HasTheValuesOfTheFactoredNetworkAtEverySize) {
   for (const int d : {1, 2, 3, 4}) {
     for (const RBFNetworkConfig& config :

@@ -20,7 +20,7 @@ TEST(TimeEach, PreparesAndTimesEveryRepetitionInOrder) {
 }
 
 TEST(TimeEach, ExcludesPreparationFromTimes) {
-  constexpr std::int64_t kLong = 2'000'000;
+  constexpr std::int64_t kLong = 2'000'000;  // 2 ms, far above the time of an empty call
   const auto wait = [] {
     for (const std::int64_t end = now() + kLong; now() < end;) {
     }

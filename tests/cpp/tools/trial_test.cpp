@@ -60,7 +60,7 @@ auto rbf_trial(const Setting& setting) {
                setting);
 }
 
-/// FNV-1a over the rows, returns by their bits.
+/// A hash of the rows, FNV-1a with its standard offset and prime; returns enter by their bits.
 std::uint64_t digest(std::span<const TestRow> rows) {
   std::uint64_t hash = 0xcbf29ce484222325;
   const auto add = [&hash](std::uint64_t word) {
@@ -75,8 +75,8 @@ std::uint64_t digest(std::span<const TestRow> rows) {
   return hash;
 }
 
-// Golden traces: decisions and digests change only if what is computed changes, on any machine and
-// compiler. There is a test episode after every 10 learning episodes.
+// Golden traces: numbers of decisions and digests that were recorded once, and are the same on any
+// machine and compiler. There is a test episode after every 10 learning episodes.
 TEST(AcrobotTrial, GoldenTraceWithoutNoise) {
   auto run = network_trial({.protocol = {.episodes = 200}});
   run.advance(200);
@@ -134,7 +134,7 @@ TEST(AcrobotTrial, TrialsRunTogetherHaveTheRowsOfTrialsRunAlone) {
   for (const int n : {0, 1, 200, 77}) Trial::advance_together(team, n);
   EXPECT_EQ(together[3].n_decisions(), 0 + 1 + 200 + 77);
   together[3].advance(2);  // it finishes the episode under way first
-  for (int i = 0; i < 40; ++i) Trial::advance_together(team, 100);
+  for (int i = 0; i < 40; ++i) Trial::advance_together(team, 100);  // until all are finished
   for (std::size_t i = 0; i < 8; ++i) {
     alone[i].advance(1000);
     EXPECT_TRUE(together[i].finished());
@@ -178,8 +178,8 @@ long n_page_faults() {
   return usage.ru_minflt;
 }
 
-// Memory is met for the first time when a trial is made, not while it decides. Once a trial has
-// been run, so that code and libraries are there, a few faults are left to the operating system.
+// The constructor of a trial touches all of its memory, so that no decision waits for a page. A
+// first trial loads code and libraries; then the operating system may still cause a few faults.
 TEST(AcrobotTrial, AnEpisodeCausesNoPageFaults) {
   for (const int n_inputs : {4, 6}) {
     const Setting setting{.sensors = {.n_sensors = n_inputs, .noise = 0.02},
