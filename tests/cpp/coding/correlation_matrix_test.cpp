@@ -19,7 +19,7 @@ double correlation(const coding::PatternTable& table, std::size_t i, std::size_t
 
 TEST(CorrelationMatrix, HasHalfOfTheUnitsOnAndApproachesTheCorrelationsOfAngles) {
   constexpr std::size_t kBins = 12, kUnits = 1000;
-  std::vector<double> wanted(kBins * kBins);
+  std::vector<double> wanted(kBins * kBins);  // 0.9 to the number of bins between two angles
   for (std::size_t i = 0; i < kBins; ++i) {
     for (std::size_t j = 0; j < kBins; ++j) {
       const std::size_t apart = i > j ? i - j : j - i;
@@ -33,7 +33,7 @@ TEST(CorrelationMatrix, HasHalfOfTheUnitsOnAndApproachesTheCorrelationsOfAngles)
     for (std::size_t k = 0; k < kUnits; ++k) n_on += table.sign(i, k) > 0 ? 1 : 0;
     EXPECT_EQ(n_on, kUnits / 2);
     for (std::size_t j = 0; j < kBins; ++j) {
-      EXPECT_NEAR(correlation(table, i, j), wanted[i * kBins + j], 20.0 / kUnits) << i << ' ' << j;
+      EXPECT_NEAR(correlation(table, i, j), wanted[i * kBins + j], 0.02) << i << ' ' << j;
     }
   }
 }

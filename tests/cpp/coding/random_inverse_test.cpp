@@ -26,7 +26,7 @@ TEST(RandomInverse, NeighboursDifferInNFlippedUnitsOfEachSign) {
     for (std::size_t k = 0; k < 40; ++k) n_on += table.sign(bin, k) > 0 ? 1 : 0;
     EXPECT_EQ(n_on, 20) << bin;  // stays balanced
     if (bin > 0) {
-      EXPECT_EQ(product(table, bin - 1, bin), 40 - 2 * 6) << bin;
+      EXPECT_EQ(product(table, bin - 1, bin), 40 - 2 * (3 + 3)) << bin;  // 6 of 40 signs differ
     }
   }
 }
@@ -35,8 +35,8 @@ TEST(RandomInverse, FlipsEveryUnitWhenAllMayFlip) {
   core::Random random(7, core::Stream::code_books);
   const auto table =
       coding::random_inverse_patterns({.n_units = 10, .n_bins = 3, .n_flipped = 5}, random);
-  EXPECT_EQ(product(table, 0, 1), -10);
-  EXPECT_EQ(product(table, 0, 2), 10);
+  EXPECT_EQ(product(table, 0, 1), -10);  // all 10 units are flipped
+  EXPECT_EQ(product(table, 0, 2), 10);   // and flipped back
 }
 
 TEST(RandomInverse, RefusesImpossibleSettings) {

@@ -31,15 +31,15 @@ TEST(SelectiveDesensitization, KeepsThePatternWhereTheModifierIsOn) {
   EXPECT_EQ(code.n_inputs(), 2U);
   EXPECT_EQ(code.n_columns(), 8U);
   EXPECT_EQ(code.n_words(), 2U);
-  EXPECT_EQ(code.max_active(), 4U);
-  EXPECT_EQ(code.slot_of(5), 65U);
+  EXPECT_EQ(code.max_active(), 2U + 2U);  // each modifier's patterns have two units on
+  EXPECT_EQ(code.slot_of(5), 64U + 1U);   // unit 1 of the second pair, which begins on a word
   std::array<std::uint64_t, 2> active{};
   std::array<std::uint64_t, 2> positive{};
   const std::array<std::int32_t, 2> bins{0, 1};
   code.encode(bins, active.data(), positive.data());
   EXPECT_EQ(active[0], 0b0110U);    // modifier pattern -1 +1 +1 -1
   EXPECT_EQ(positive[0], 0b0100U);  // 0 -1 +1 0
-  EXPECT_EQ(active[1], 0b1100U);
+  EXPECT_EQ(active[1], 0b1100U);    // modifier pattern -1 -1 +1 +1
   EXPECT_EQ(positive[1], 0b0100U);  // 0 0 +1 -1
 }
 
@@ -52,7 +52,7 @@ TEST(SelectiveDesensitization, AcceptsASingleInput) {
   EXPECT_EQ(positive, 1U);
 }
 
-// Products read from the tables are those of the codes' words, with shared gates and without.
+// Inner products from the tables equal those of the codes, with shared and with separate gates.
 TEST(SelectiveDesensitization, InnerProductsOfBinsEqualThoseOfCodes) {
   core::Random random(4, core::Stream::code_books);
   for (const std::size_t n_units : {5U, 64U, 200U, 300U}) {

@@ -43,6 +43,7 @@ struct Paired {
   ColumnLists lists;
 };
 
+/// The sum of the listed columns, as a dense vector.
 std::vector<int> dense(std::size_t n_columns, const SignedColumns& columns) {
   std::vector<int> x(n_columns, 0);
   for (const auto j : columns.plus) x[j] += 1;
@@ -65,6 +66,7 @@ std::vector<int> x_sd(const StateCode& code, std::span<const Bin> bins) {
   return x;
 }
 
+/// The number of inputs l, and the strides; without strides all pairs.
 struct Wiring {
   std::size_t l;
   std::vector<std::size_t> strides = {};
@@ -135,20 +137,22 @@ TEST_P(StateCodeOfInputs, ThePairedCodeHasHalfAsManyActiveColumns) {
     EXPECT_TRUE(std::ranges::is_partitioned(
         *list, [&](std::uint32_t j) { return j < code.n_double_columns(); }));
   }
+  // A unit in a pair takes one of two columns, which it shares: half a column; an unpaired unit
+  // one.
   EXPECT_EQ(2 * n_listed, n_active);
 }
 
 TEST_P(StateCodeOfInputs, EveryColumnOfThePairedCodeStandsForOneOrTwoUnits) {
   const auto code = GetParam().code(13, 5);
-  std::vector<int> taken(code.n_columns(), 0);
+  std::vector<int> n_uses(code.n_columns(), 0);
   for (std::size_t j = 0; j < code.n_columns(); ++j) {
     const auto columns = code.columns_of(j);
     EXPECT_EQ(columns.paired, columns.first < code.n_double_columns());
-    ++taken[columns.first];
-    if (columns.paired) ++taken[columns.second];
+    ++n_uses[columns.first];
+    if (columns.paired) ++n_uses[columns.second];
   }
-  for (std::size_t j = 0; j < taken.size(); ++j) {
-    EXPECT_EQ(taken[j], j < code.n_double_columns() ? 2 : 1);
+  for (std::size_t j = 0; j < n_uses.size(); ++j) {
+    EXPECT_EQ(n_uses[j], j < code.n_double_columns() ? 2 : 1);
   }
   EXPECT_THROW(static_cast<void>(code.columns_of(code.n_columns())), std::invalid_argument);
 }

@@ -35,7 +35,7 @@ TEST(BitLayer, TheDistanceCountsUnitsThatDiffer) {
   const auto b = words({2, 3, 99}, 101);
   const BitLayer layer(a.data(), 101);
   const BitLayer changed(b.data(), 101);
-  EXPECT_EQ(layer.distance(changed), 4U);
+  EXPECT_EQ(layer.distance(changed), 4U);  // units 1, 3, 99 and 100
   EXPECT_EQ(layer.distance(layer), 0U);
   EXPECT_NE(layer, changed);
   EXPECT_EQ(layer, BitLayer(words({1, 2, 100}, 101).data(), 101));
@@ -47,7 +47,7 @@ TEST(BitLayer, TheNumberOfWordsIsRoundedUp) {
   EXPECT_EQ(BitLayer(nullptr, 0).count(), 0U);
 }
 
-// The only access to the words of a bitset that the standard promises.
+// BitLayer relies on to_ullong, the only access to the bits of a bitset in the standard.
 TEST(BitLayer, AWordHasTheValueOfItsBits) {
   BitWord word;
   word.set(0);

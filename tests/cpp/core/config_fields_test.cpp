@@ -13,7 +13,7 @@ struct Policy {
   double epsilon = 0.1;
 
   static constexpr auto fields() noexcept {
-    return std::tuple(field("epsilon", &Policy::epsilon, "Of chance.", within(0, 1)));
+    return std::tuple(field("epsilon", &Policy::epsilon, "Probability.", within(0, 1)));
   }
 };
 

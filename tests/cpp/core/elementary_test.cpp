@@ -30,7 +30,7 @@ TEST(SinCos, IsExactlyOddAndEven) {
 TEST(SinCos, LiesOnTheUnitCircle) {
   for (int i = -20000; i <= 20000; ++i) {
     const auto at = sin_cos(0.0131 * i);
-    EXPECT_NEAR(at.sin * at.sin + at.cos * at.cos, 1.0, 4e-16);
+    EXPECT_NEAR(at.sin * at.sin + at.cos * at.cos, 1.0, 4e-16);  // two rounding errors of doubles
     EXPECT_LE(std::abs(at.sin), 1.0);
     EXPECT_LE(std::abs(at.cos), 1.0);
   }
@@ -44,7 +44,7 @@ TEST(SinCos, IsNaNOutsideItsRange) {
   EXPECT_FALSE(std::isnan(sin_cos(sdnn::core::kSinCosLimit).sin));
 }
 
-// The bits are the same with every compiler and optimization level.
+// The digest was recorded once; the bits are the same with every compiler and optimization level.
 TEST(SinCos, KeepsItsBits) {
   std::uint64_t digest = 0;
   for (int i = 0; i < 100000; ++i) {
@@ -67,7 +67,8 @@ TEST(Log, IsExactAtTheLimitsOfItsRange) {
 
 TEST(Exp, IsTheInverseOfTheLogarithm) {
   for (double x = 1e-300; x < 1e300; x *= 7.3) {
-    const double y = sdnn::core::log(x);  // an error in y is one of x times |y|
+    const double y =
+        sdnn::core::log(x);  // a relative error of y becomes |y| times as large in exp(y)
     EXPECT_NEAR(sdnn::core::exp(y) / x, 1.0, (std::abs(y) + 2.0) * 2e-16) << x;
   }
 }
@@ -76,6 +77,7 @@ TEST(Exp, IsExactAtTheLimitsOfItsRange) {
   EXPECT_EQ(sdnn::core::exp(0.0), 1.0);
   EXPECT_EQ(sdnn::core::exp(-0.0), 1.0);
   EXPECT_EQ(sdnn::core::exp(5e-324), 1.0);
+  // The last finite result, infinity, the smallest result above 0, and 0.
   EXPECT_EQ(sdnn::core::exp(709.782712893384), 0x1.fffffffffff2ap+1023);
   EXPECT_EQ(sdnn::core::exp(709.7827128933841), kInfinity);
   EXPECT_EQ(sdnn::core::exp(kInfinity), kInfinity);
@@ -87,7 +89,7 @@ TEST(Exp, IsExactAtTheLimitsOfItsRange) {
   EXPECT_TRUE(std::isnan(sdnn::core::exp(-kNaN)));
 }
 
-// The bits are the same with every compiler and optimization level.
+// The digest was recorded once; the bits are the same with every compiler and optimization level.
 TEST(Exp, KeepsItsBits) {
   std::uint64_t digest = 0;
   for (int i = -50000; i < 50000; ++i) {
@@ -121,7 +123,7 @@ TEST(Atan2, TreatsZerosAndInfinitiesLikeTheCLibrary) {
   EXPECT_TRUE(std::isnan(sdnn::core::atan2(1.0, kNaN)));
 }
 
-// The bits are the same with every compiler and optimization level.
+// The digest was recorded once; the bits are the same with every compiler and optimization level.
 TEST(Atan2, KeepsItsBits) {
   std::uint64_t digest = 0;
   for (int i = -50000; i < 50000; ++i) {

@@ -52,7 +52,7 @@ TEST(Pcg64, DrawsTheWordsOfNumPysSeedSequence) {
 
 TEST(Pcg64, ContinuesFromItsState) {
   Pcg64 random(Seeds{1, 2}), restored(Seeds{3});
-  (void)random.below(5);  // half of 64 bits is left
+  (void)random.below(5);  // a draw of 32 bits, so that half of 64 bits is left
   restore(restored, state_of(random));
   for (int i = 0; i < 9; ++i) EXPECT_EQ(random.below(1000), restored.below(1000));
   testing::expect_that_damage_is_refused(random);

@@ -82,7 +82,7 @@ TEST(Random, NormalConsumesOneDraw) {
   for (int i = 0; i < 1000; ++i) {
     const double z = normal.normal();
     EXPECT_TRUE(std::isfinite(z));
-    EXPECT_EQ(z < 0.0, bits.bits() < (std::uint64_t{1} << 63));  // the lower half
+    EXPECT_EQ(z < 0.0, bits.bits() < (std::uint64_t{1} << 63));  // the smaller half of all numbers
   }
 }
 
@@ -114,7 +114,7 @@ TEST(Random, ShuffleReachesEveryOrderEquallyOften) {
     random.shuffle(std::span<unsigned>(items));
     ++counts[items[0] * 9 + items[1] * 3 + items[2]];
   }
-  EXPECT_EQ(std::count(counts.begin(), counts.end(), 0), 27 - 6);  // of 3^3 triples 3! are orders
+  EXPECT_EQ(std::count(counts.begin(), counts.end(), 0), 27 - 6);  // 3^3 triples, 3! permutations
   const double sigma = std::sqrt(kShuffles / 6.0 * 5.0 / 6.0);
   for (const int count : counts) {
     if (count > 0) {

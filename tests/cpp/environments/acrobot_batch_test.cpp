@@ -39,8 +39,9 @@ struct Step {
   std::vector<std::uint8_t> terminated, truncated;
 };
 
-// Random starts, torques and tolerances; some acrobots stand still, ended ones begin anew. Returns
-// the number of episodes and adds the goals to `n_goals`.
+// Compares a batch with single acrobots, with random starts, torques and tolerances. A tenth of the
+// acrobots rests in each step; ended episodes begin again. Returns the number of episodes, or 0
+// after a difference, and adds the number of goals to `n_goals`.
 int compare_with_single(const AcrobotConfig& config, std::size_t n, int n_steps, std::uint64_t seed,
                         int& n_goals) {
   core::Random random(seed, core::Stream::exploration);
@@ -68,14 +69,14 @@ int compare_with_single(const AcrobotConfig& config, std::size_t n, int n_steps,
     for (std::size_t i = 0; i < n; ++i) {
       StepResult expected{0.0, false, false};
       if (step.moving[i]) expected = singles[i].step(step.torques[i], step.tolerances[i]);
-      const bool same = step.rewards[i] == expected.reward &&
-                        step.terminated[i] == expected.terminated &&
-                        step.truncated[i] == expected.truncated &&
-                        same_bits(batch.state(i), singles[i].state()) &&
-                        batch.tip_height(i) == singles[i].tip_height() &&
-                        batch.decisions(i) == singles[i].decisions();
-      EXPECT_TRUE(same) << "acrobot " << i << " of " << n << ", step " << s;
-      if (!same) return 0;
+      const bool is_same = step.rewards[i] == expected.reward &&
+                           step.terminated[i] == expected.terminated &&
+                           step.truncated[i] == expected.truncated &&
+                           same_bits(batch.state(i), singles[i].state()) &&
+                           batch.tip_height(i) == singles[i].tip_height() &&
+                           batch.decisions(i) == singles[i].decisions();
+      EXPECT_TRUE(is_same) << "acrobot " << i << " of " << n << ", step " << s;
+      if (!is_same) return 0;
       n_goals += expected.terminated;
       if (expected.terminated || expected.truncated) begin(i);
     }
@@ -90,7 +91,7 @@ TEST(AcrobotBatch, HasTheBitsOfSingleAcrobotsOnEveryInstructionSet) {
     for (const std::size_t n : {1u, 2u, 3u, 4u, 5u, 7u, 8u, 9u, 15u, 16u, 17u, 61u}) {
       n_episodes += compare_with_single({}, n, 300, n, n_goals);
     }
-    EXPECT_GT(n_episodes, 1500);
+    EXPECT_GT(n_episodes, 1500);  // so that every end of an episode has been compared
     EXPECT_GT(n_goals, 750);
   });
 }
@@ -132,7 +133,7 @@ TEST(AcrobotBatch, AnOverflowDoesNotChangeTheOtherAcrobots) {
               "the speed of acrobot 3 is too high for this integration_step");
     EXPECT_TRUE(same_bits(batch.state(4), single.state()));
     EXPECT_EQ(batch.decisions(4), 1);
-    EXPECT_THROW(step.of(batch), std::logic_error);  // 3 is over
+    EXPECT_THROW(step.of(batch), std::logic_error);  // the episode of acrobot 3 is over
     batch.reset(3);
     EXPECT_NO_THROW(step.of(batch));
   });

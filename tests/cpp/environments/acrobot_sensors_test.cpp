@@ -29,11 +29,12 @@ TEST(AcrobotSensors, AreNormalizedAsWorkedByHand) {
   const auto rest = observe({6, 0.0}, {0.0, 0.0, 0.0, 0.0});
   EXPECT_EQ(rest, (std::vector<double>{0.5, 0.5, 0.5, 0.5, 0.0, 0.0}));
   const auto observation = observe({6, 0.0}, {kPi / 2.0, -kPi / 2.0, 1.5 * kPi, -2.5 * kPi});
+  // Angles (x + pi) / (2 pi); speeds (v / limit + 1) / 2 with the limits 3 pi and 5 pi.
   EXPECT_DOUBLE_EQ(observation[0], 0.75);
   EXPECT_DOUBLE_EQ(observation[1], 0.25);
   EXPECT_DOUBLE_EQ(observation[2], 0.75);
   EXPECT_DOUBLE_EQ(observation[3], 0.25);
-  EXPECT_DOUBLE_EQ(observation[4], 0.25);  // 2 (1/16 + 1/16)
+  EXPECT_DOUBLE_EQ(observation[4], 0.25);  // speeds: 2 ((3/4 - 1/2)^2 + (1/4 - 1/2)^2)
   EXPECT_DOUBLE_EQ(observation[5], 0.25);  // tip 1 m below joint 1: (2 - 0 - 1) / 4
   const auto up = observe({6, 0.0}, {-kPi, 0.0, 100.0, -100.0});
   EXPECT_EQ(up, (std::vector<double>{0.0, 0.5, 1.0, 0.0, 1.0, 1.0}));
@@ -91,7 +92,7 @@ TEST(AcrobotSensors, NoiseWrapsAnglesAndClipsOtherSensors) {
     ceiling += observation[2] == 1.0;
     floor += observation[3] == 0.0;
   }
-  for (const int n : {low, high, ceiling, floor}) EXPECT_GT(n, 850);  // about half of 2000
+  for (const int n : {low, high, ceiling, floor}) EXPECT_GT(n, 850);  // 1000 is expected
 }
 
 TEST(AcrobotSensors, NoiseMayEnterBeforeRedundantVariablesAreComputed) {

@@ -14,8 +14,8 @@ using sdnn::environments::GoalScheduleKind;
 TEST(GoalSchedule, InverseLinearIsTheDefault) {
   const GoalSchedule lambda;
   EXPECT_DOUBLE_EQ(lambda(1), 1.0 / 1.01);
-  EXPECT_DOUBLE_EQ(lambda(100), 0.5);
-  EXPECT_DOUBLE_EQ(lambda(300), 0.25);
+  EXPECT_DOUBLE_EQ(lambda(100), 1.0 / 2.0);
+  EXPECT_DOUBLE_EQ(lambda(300), 1.0 / 4.0);
   EXPECT_DOUBLE_EQ(lambda(10000), 1.0 / 101.0);
   EXPECT_EQ(lambda(10001), 0.01);
   EXPECT_EQ(lambda(15000), 0.01);

@@ -103,20 +103,21 @@ class CorrelationSearch {
   struct Swap {
     std::size_t pattern, k, l;
   };
-  static constexpr std::size_t kDrawnAhead = 32;
-  static constexpr std::size_t kProposalsPerPoint = 4096;
+  static constexpr std::size_t kDrawnAhead = 32;           // swaps whose units are prefetched
+  static constexpr std::size_t kProposalsPerPoint = 4096;  // between two interruption points
 
   /// Swaps a +1 and a -1 of a pattern, unless that raises the squared error of its products with
   /// the first `n_others`.
   void try_swap(const Swap& swap, std::size_t n_others) {
     const auto [i, k, l] = swap;
-    std::int8_t* const one = unit(k);
-    std::int8_t* const other = unit(l);
-    if (one[i] == other[i]) return;
-    const std::int64_t twice = other[i] - one[i];
-    const auto step = [&](std::size_t j) { return twice * (one[j] - other[j]); };
+    std::int8_t* const unit_k = unit(k);
+    std::int8_t* const unit_l = unit(l);
+    if (unit_k[i] == unit_l[i]) return;
+    const std::int64_t twice = unit_l[i] - unit_k[i];
+    const auto step = [&](std::size_t j) { return twice * (unit_k[j] - unit_l[j]); };
     const std::int64_t* const products = &products_[i * n_bins_];
     const std::int64_t* const wanted = &wanted_[i * n_bins_];
+    // A product p moves by step s, and its squared error by (p + s - w)^2 - (p - w)^2.
     std::int64_t change = 0;
     const auto add = [&](std::size_t from, std::size_t to) {
       for (std::size_t j = from; j < to; ++j) {
@@ -131,7 +132,7 @@ class CorrelationSearch {
       products_[i * n_bins_ + j] += step(j);
       products_[j * n_bins_ + i] = products_[i * n_bins_ + j];
     }
-    std::swap(one[i], other[i]);
+    std::swap(unit_k[i], unit_l[i]);
   }
 
   /// The signs of unit k in all patterns.
@@ -180,6 +181,7 @@ inline PatternTable correlation_matrix_patterns(int n_units, std::span<const dou
   }
   const auto units = static_cast<std::size_t>(n_units);
   detail::CorrelationSearch search(correlations, n_bins, units);
+  // 20 proposals for each unit of a pattern, or fewer if these would take more than 4e8 steps.
   const std::uint64_t affordable = 400'000'000 / (std::uint64_t{n_bins} * n_bins * units) + 1;
   const std::size_t n_proposals =
       units * static_cast<std::size_t>(std::min<std::uint64_t>(20, affordable));

@@ -54,7 +54,7 @@ struct Gate {
 };
 
 /// The product <x_SD(a), x_SD(b)>, gate by gate: where both modifiers are on, the number of equal
-/// signs minus that of unequal signs.
+/// signs minus that of unequal signs. `Words` is n_words as a constant; 0 stands for any number.
 template <std::size_t Words>
 SDNN_INLINE std::int32_t gated_product_of_width(std::span<const Gate> gates,
                                                 const TableOfInput* modified, std::size_t n_words,
@@ -190,12 +190,12 @@ class SelectiveDesensitization {
               std::uint64_t* positive) const noexcept {
     const std::size_t n_words = n_pair_words();
     for (const detail::Gate& gate : gates_) {
-      const core::BitWord* const by = gate.modifier.pattern(bins.data(), n_words);
+      const core::BitWord* const gate_bits = gate.modifier.pattern(bins.data(), n_words);
       for (std::size_t p = gate.begin; p < gate.end; ++p) {
         const core::BitWord* const x = modified_at_[p].pattern(bins.data(), n_words);
         for (std::size_t w = 0; w < n_words; ++w) {
-          *active++ = by[w].to_ullong();
-          *positive++ = (by[w] & x[w]).to_ullong();
+          *active++ = gate_bits[w].to_ullong();
+          *positive++ = (gate_bits[w] & x[w]).to_ullong();
         }
       }
     }
@@ -206,9 +206,10 @@ class SelectiveDesensitization {
                    std::uint64_t* active, std::uint64_t* positive) const noexcept {
     const std::size_t n_words = n_pair_words();
     const auto x = modified_[pair]->words()[static_cast<std::size_t>(modified) * n_words + word];
-    const auto by = modifiers_[pair]->words()[static_cast<std::size_t>(modifier) * n_words + word];
-    *active = by.to_ullong();
-    *positive = (by & x).to_ullong();
+    const auto gate_bits =
+        modifiers_[pair]->words()[static_cast<std::size_t>(modifier) * n_words + word];
+    *active = gate_bits.to_ullong();
+    *positive = (gate_bits & x).to_ullong();
   }
 
   /// The inner product of the codes of two samples. Shapes: (n_inputs,), checked before.

@@ -110,11 +110,11 @@ class StateCode {
     const std::size_t group = unit / m;
     const std::size_t nu = groups_[group].modifier;
     const std::size_t modifier = permutations_[group][unit % m];
-    const std::size_t among = ranks_[group];
-    const std::size_t pair = among / 2;
+    const std::size_t rank = ranks_[group];
+    const std::size_t pair = rank / 2;
     if (pair == n_pairs()) return {false, n_double_columns() + nu * m + modifier, 0, 0};
     const std::size_t first = 2 * (nu * n_pairs() + pair) * m + modifier;
-    return {true, first, first + m, among % 2 == 0 ? 1 : -1};
+    return {true, first, first + m, rank % 2 == 0 ? 1 : -1};
   }
 
   /// The paired code of a state. Shapes: bins (l,), active and positive (n_words,).
@@ -124,13 +124,13 @@ class StateCode {
     const std::size_t width = code_.n_pair_words();
     for (std::size_t first = 0; first < 2 * n_inputs() * n_pairs() * width; first += 2 * width) {
       for (std::size_t w = first; w < first + width; ++w) {
-        const std::uint64_t one = positive[w];
-        const std::uint64_t other = positive[w + width];
-        const std::uint64_t unlike = one ^ other;
+        const std::uint64_t first_sign = positive[w];
+        const std::uint64_t second_sign = positive[w + width];
+        const std::uint64_t unlike = first_sign ^ second_sign;
         active[w] ^= unlike;  // half of the sum where the signs are equal
-        positive[w] = one & other;
+        positive[w] = first_sign & second_sign;
         active[w + width] = unlike;
-        positive[w + width] = one & ~other;
+        positive[w + width] = first_sign & ~second_sign;
       }
     }
   }

@@ -69,7 +69,8 @@ double n_bins_of(const Config& config) noexcept {
          n_numbers * (config.n_anchor_patterns - 1.0) * (config.n_interpolated + 1.0);
 }
 
-/// The bytes of the patterns of `n_bins` bins, plain and permuted for each partner.
+/// The bytes of the patterns of `n_bins` bins: the original ones, and permuted ones for each
+/// partner.
 template <class Config>
 double pattern_bytes_of(const Config& config, double n_bins) noexcept {
   return (n_partners_of(config) + 1.0) * n_bins * 8.0 * std::ceil(config.n_pattern_units / 64.0);

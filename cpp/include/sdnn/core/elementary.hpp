@@ -103,8 +103,8 @@ SDNN_INLINE BasicSinCos<Real> sin_cos(const Real& x) noexcept {
 /// large parts are exact; our coefficients (relative error 2^-59).
 inline double log(double x) noexcept {
   constexpr std::uint64_t kMantissa = (std::uint64_t{1} << 52) - 1;
-  constexpr std::uint64_t kOne = std::uint64_t{1023} << 52;
-  constexpr std::uint64_t kSqrtHalf = 0x6a09e667f3bcd;  // mantissa of sqrt 2 and of sqrt 1/2
+  constexpr std::uint64_t kOne = std::uint64_t{1023} << 52;  // the bits of 1.0
+  constexpr std::uint64_t kSqrtHalf = 0x6a09e667f3bcd;       // mantissa of sqrt 2 and of sqrt 1/2
   constexpr double kLog2High = 0x1.62e42fefa38p-1, kLog2Low = 0x1.ef35793c7673p-45;
   constexpr std::array<double, 7> kSeries{
       0x1.5555555555595p-1, 0x1.999999997f1b0p-2, 0x1.249249428d962p-2, 0x1.c71c51900ef42p-3,
@@ -194,6 +194,7 @@ inline double atan2(double y, double x) noexcept {
       -0x1.745d16016ea5fp-4, 0x1.3b138e4b5b747p-4, -0x1.110ea393fffe2p-4, 0x1.e1a795c3fb24fp-5,
       -0x1.ad441c37157fap-5, 0x1.7b1d7856d14a5p-5, -0x1.37ce51c509047p-5, 0x1.99984c3613cd5p-6,
       -0x1.2dd40041c2c27p-7};
+  // k pi / 4, k = 0 .. 4, and the parts of these that doubles lack.
   constexpr std::array<double, 5> kEighths{0.0, 0x1.921fb54442d18p-1, 0x1.921fb54442d18p+0,
                                            0x1.2d97c7f3321d2p+1, 0x1.921fb54442d18p+1};
   constexpr std::array<double, 5> kRests{0.0, 0x1.1a62633145c07p-55, 0x1.1a62633145c07p-54,
@@ -283,7 +284,7 @@ inline double normal_quantile(double p) noexcept {
 
   const double centred = p - 0.5;
   if (centred >= -0.425 && centred <= 0.425) {
-    return centred * ratio(kCentreTop, kCentreBottom, 0.180625 - centred * centred);
+    return centred * ratio(kCentreTop, kCentreBottom, 0.180625 - centred * centred);  // 0.425^2
   }
   if (!(p >= 0.0 && p <= 1.0)) return std::numeric_limits<double>::quiet_NaN();
   if (p == 0.0 || p == 1.0) {

@@ -95,8 +95,8 @@ namespace detail {
 
 inline std::atomic<InstructionSet>& active_level() {
   static std::atomic<InstructionSet> level = [] {
-    const char* const wanted = std::getenv("SDNN_INSTRUCTION_SET");
-    return wanted == nullptr ? best_instruction_set() : instruction_set_named(wanted);
+    const char* const requested = std::getenv("SDNN_INSTRUCTION_SET");
+    return requested == nullptr ? best_instruction_set() : instruction_set_named(requested);
   }();
   return level;
 }

@@ -69,7 +69,7 @@ class Pcg64 {
     }
   }
 
-  /// Words that a SeedSequence of these words generates.
+  /// Words that a SeedSequence of these words generates, with the constants of its definition.
   static std::array<std::uint64_t, 4> drawn_from(std::span<const std::uint32_t> words) noexcept {
     std::uint32_t constant = 0x43b0d7e5;
     const auto hashed = [&constant](std::uint32_t value) {
@@ -123,6 +123,7 @@ class Pcg64 {
   }
 
   void advance() noexcept {
+    // The default multiplier of PCG with 128 bits.
     constexpr Wide kFactor{2549297995355413924U, 4865540595714422341U};
     Wide next = product(state_.low, kFactor.low);
     next.high += state_.high * kFactor.low + state_.low * kFactor.high;

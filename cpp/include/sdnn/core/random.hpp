@@ -95,7 +95,7 @@ class Random {
   /// interrupted.
   template <class Item>
   void shuffle(std::span<Item> items) {
-    constexpr std::size_t kItemsPerPoint = std::size_t{1} << 16;
+    constexpr std::size_t kItemsPerPoint = std::size_t{1} << 16;  // between two interruption points
     for (std::size_t i = items.size(); i > 1; --i) {
       if (i % kItemsPerPoint == 0) interruption_point();
       std::swap(items[i - 1], items[below(i)]);
@@ -103,6 +103,7 @@ class Random {
   }
 
  private:
+  /// SplitMix64 with its constants: advances the state, and returns a number.
   static std::uint64_t split_mix(std::uint64_t& state) noexcept {
     state += 0x9e3779b97f4a7c15;
     std::uint64_t z = state;

@@ -29,7 +29,8 @@
 
 namespace sdnn::core {
 
-static_assert(std::endian::native == std::endian::little, "tensors are stored as they lie there");
+static_assert(std::endian::native == std::endian::little,
+              "tensors are stored with the lowest byte first");
 
 /// Content of a file.
 struct FileContent {
@@ -269,7 +270,7 @@ inline void write_file(const std::filesystem::path& path, const FileContent& con
   std::ranges::stable_sort(order, {}, [](const State::value_type* named) {
     return facts_of(named->second.type).storage_rank;  // aligns numbers; ties are ordered by name
   });
-  const nlohmann::json about = {{"checksum", "00000000"},
+  const nlohmann::json about = {{"checksum", "00000000"},  // replaced below
                                 {"description", content.description},
                                 {"format", kFileFormat},
                                 {"kind", content.kind},
@@ -291,7 +292,7 @@ inline void write_file(const std::filesystem::path& path, const FileContent& con
   } catch (const nlohmann::json::exception& error) {  // the text is not UTF-8
     throw std::runtime_error(path.string() + ": cannot be written: " + error.what());
   }
-  text.append((8 - text.size() % 8) % 8, ' ');
+  text.append((8 - text.size() % 8) % 8, ' ');  // so that tensors begin at multiples of 8 bytes
   const std::uint64_t header_size = text.size();
   text.insert(0, reinterpret_cast<const char*>(&header_size), sizeof(header_size));
   const auto head = std::as_bytes(std::span(text));

@@ -33,7 +33,7 @@ TEST(CodedSamples, ProductsEqualThoseOfSigns) {
   const auto code = small_code(70);
   const std::vector<Bin> bins = {0, 1, 2, 3, 4, 0};
   const std::vector<Bin> other_bins = {4, 4, 1, 2};
-  std::vector<std::int8_t> signs(3 * 140);
+  std::vector<std::int8_t> signs(3 * 140);  // 3 samples, 2 pairs of 70 columns
   std::vector<std::int8_t> other_signs(2 * 140);
   write_signs(code, bins, signs);
   write_signs(code, other_bins, other_signs);
@@ -53,7 +53,7 @@ TEST(CodedSamples, CodesArePaddedToFourWords) {
   const CodedSamples coded(code, std::vector<Bin>{0, 1, 2, 3});
   EXPECT_EQ(coded.size(), 2U);
   EXPECT_EQ(coded.n_words(), 4U);
-  EXPECT_EQ(CodedSamples::bytes(code, 2), 2U * 2 * 4 * 8);
+  EXPECT_EQ(CodedSamples::bytes(code, 2), 2U * 2 * 4 * 8);  // samples, bits of two kinds, words
 }
 
 TEST(CodedSamples, RefuseBinsOutOfRange) {

@@ -16,18 +16,19 @@ namespace {
 TEST(TernaryCode, InnerProductsAreExactForAnyNumberOfWords) {
   core::Random random(3, core::Stream::weights);
   for (std::size_t n_words = 0; n_words < 270; n_words += n_words < 70 ? 1 : 13) {
-    const auto one = testing::random_code(n_words, random);
+    const auto code = testing::random_code(n_words, random);
     const auto other = testing::random_code(n_words, random);
     std::int32_t expected = 0;
     for (std::size_t slot = 0; slot < 64 * n_words; ++slot)
-      expected += one.at(slot) * other.at(slot);
+      expected += code.at(slot) * other.at(slot);
     testing::on_every_instruction_set([&](auto level) {
-      EXPECT_EQ(coding::inner_product(one.words(), other.words(), n_words), expected) << level;
+      EXPECT_EQ(coding::inner_product(code.words(), other.words(), n_words), expected) << level;
     });
   }
 }
 
-TEST(TernaryCode, InnerProductsOfFullCodesDoNotOverflow) {  // where counts in bytes are fullest
+TEST(TernaryCode,
+     InnerProductsOfFullCodesDoNotOverflow) {  // counts in bytes reach 8 * 31 at 124 words
   for (const std::size_t n_words : {124U, 128U, 400U}) {
     testing::Code on{std::vector<std::uint64_t>(n_words, ~std::uint64_t{0}),
                      std::vector<std::uint64_t>(n_words, ~std::uint64_t{0})};
@@ -98,7 +99,7 @@ TEST(ColumnLists, NumberColumnsOfGroupsConsecutively) {
   std::vector<std::uint32_t> plus;
   std::vector<std::uint32_t> minus;
   for (std::uint32_t w = 0; w < n_words; ++w) {
-    if (w % 4 == 3) {  // groups of 200 columns
+    if (w % 4 == 3) {  // groups of 3 * 64 + 8 = 200 columns
       code.active[w] &= 0xFF;
       code.positive[w] &= 0xFF;
     }

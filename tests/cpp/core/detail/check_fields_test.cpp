@@ -18,7 +18,7 @@ struct Numbers {
   int count = 1;
   std::optional<double> last = {};
   std::vector<int> sizes = {};
-  std::vector<bool> flags = {true, false};  // proxies instead of items
+  std::vector<bool> flags = {true, false};  // a vector whose items are proxies
 
   static constexpr auto fields() noexcept {
     return std::tuple(field("share", &Numbers::share, "", within(0, 1)),

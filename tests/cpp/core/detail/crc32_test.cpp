@@ -19,7 +19,7 @@ std::uint32_t crc32_of(const std::string& text, std::uint32_t before = 0) {
 TEST(Crc32, EqualsZlib) {
   EXPECT_EQ(crc32_of(""), 0U);
   EXPECT_EQ(crc32_of("a"), 0xe8b7be43U);
-  EXPECT_EQ(crc32_of("123456789"), 0xcbf43926U);  // the check value of catalogues
+  EXPECT_EQ(crc32_of("123456789"), 0xcbf43926U);  // the published check value of CRC-32
   EXPECT_EQ(crc32_of("The quick brown fox jumps over the lazy dog"), 0x414fa339U);
 }
 
@@ -30,7 +30,7 @@ TEST(Crc32, MayBeComputedInTwoParts) {
   }
 }
 
-// The register as its definition has it, bit by bit.
+/// The CRC by its definition, bit by bit.
 std::uint32_t crc32_by_bits(const std::string& text) {
   std::uint32_t crc = ~0U;
   for (const char letter : text) {
@@ -42,6 +42,7 @@ std::uint32_t crc32_by_bits(const std::string& text) {
 
 TEST(Crc32, EqualsItsDefinitionOnEveryInstructionSet) {
   std::string text;
+  // Bytes of a linear congruential generator, up to four blocks of 64 bytes and a rest.
   for (std::uint32_t n = 0, x = 1; n < 300; ++n, x = x * 1103515245U + 12345U) {
     const std::uint32_t expected = crc32_by_bits(text);
     testing::on_every_instruction_set([&](auto name) {

@@ -14,7 +14,7 @@ using sdnn::core::grid_cells;
 using sdnn::core::require_table_bytes;
 using sdnn::testing::message_of;
 
-constexpr std::uint64_t kAnything = UINT64_MAX;
+constexpr std::uint64_t kNoLimit = UINT64_MAX;
 
 std::string message(std::size_t n_per_dimension, std::size_t n_dimensions, std::size_t bytes,
                     std::uint64_t limit) {
@@ -23,10 +23,10 @@ std::string message(std::size_t n_per_dimension, std::size_t n_dimensions, std::
 }
 
 TEST(GridCells, CountsArePowersOfTheCellsPerDimension) {
-  EXPECT_EQ(grid_cells("n", "cells", 9, 6, 84, kAnything), 531441U);  // 9^6, of 84 bytes each
-  EXPECT_EQ(grid_cells("n", "cells", 4, 7, 8, kAnything), 16384U);
-  EXPECT_EQ(grid_cells("n", "cells", 5, 0, 1, kAnything), 1U);
-  EXPECT_EQ(grid_cells("n", "cells", 2, 8 * sizeof(std::size_t) - 1, 1, kAnything),
+  EXPECT_EQ(grid_cells("n", "cells", 9, 6, 84, kNoLimit), 531441U);  // 9^6, of 84 bytes each
+  EXPECT_EQ(grid_cells("n", "cells", 4, 7, 8, kNoLimit), 16384U);    // 4^7
+  EXPECT_EQ(grid_cells("n", "cells", 5, 0, 1, kNoLimit), 1U);
+  EXPECT_EQ(grid_cells("n", "cells", 2, 8 * sizeof(std::size_t) - 1, 1, kNoLimit),
             SIZE_MAX / 2 + 1);
 }
 
@@ -40,18 +40,18 @@ TEST(GridCells, ATableOfTheSizeOfTheLimitIsAccepted) {
 
 TEST(GridCells, SizesOf64BitsAndMoreAreRefused) {
   EXPECT_EQ(
-      message(2, 63, 4, kAnything),
+      message(2, 63, 4, kNoLimit),
       "n_sets must be smaller: a table of 2^63 = 9223372036854775808 rules needs 2^64 bytes or "
       "more, but "
       "max_table_bytes is 18446744073709551615");
-  EXPECT_EQ(message(9, 40, 84, kAnything),
+  EXPECT_EQ(message(9, 40, 84, kNoLimit),
             "n_sets must be smaller: a table of 9^40 rules needs 2^64 bytes or more, but "
             "max_table_bytes is "
             "18446744073709551615");
 }
 
 TEST(GridCells, SizesBeyondTheAddressSpaceAreRefused) {
-  EXPECT_EQ(message(2, 33, 1, kAnything),
+  EXPECT_EQ(message(2, 33, 1, kNoLimit),
             sizeof(std::size_t) > 4 ? "no error"
                                     : "n_sets must be smaller: a table of 2^33 = 8589934592 rules "
                                       "needs 8589934592 bytes, but at most 4294967295 can be "

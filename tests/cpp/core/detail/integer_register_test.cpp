@@ -51,7 +51,7 @@ TEST(IntegerRegister, WrapsAround) {
   sum.add(most.data());
   std::vector<std::int16_t> stored(16);
   sum.store(stored.data());
-  EXPECT_EQ(stored, std::vector<std::int16_t>(16, -2));
+  EXPECT_EQ(stored, std::vector<std::int16_t>(16, -2));  // 2 (2^15 - 1) - 2^16
   sum.subtract(most.data());
   sum.store(stored.data());
   EXPECT_EQ(stored, most);

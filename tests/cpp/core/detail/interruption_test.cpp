@@ -22,7 +22,7 @@ using testing::StopError;
 
 TEST(Interruption, DoesNothingUntilItIsRequested) {
   EXPECT_NO_THROW(interruption_point());
-  const StopAt stop(1);
+  const StopAt stop(1);  // throws at the second point from here on
   EXPECT_NO_THROW(interruption_point());
   EXPECT_THROW(interruption_point(), StopError);
 }
@@ -50,13 +50,13 @@ TEST(Interruption, DoesNotChangeTheOrderOfAShuffleThatContinues) {
   std::iota(expected.begin(), expected.end(), 0U);
   std::iota(shuffled.begin(), shuffled.end(), 0U);
   Random(1, Stream::weights).shuffle(std::span(expected));
-  const StopAt stop(1000);
+  const StopAt stop(1000);  // far more points than the shuffle has
   Random(1, Stream::weights).shuffle(std::span(shuffled));
   EXPECT_LT(n_points_left, 1000);
   EXPECT_EQ(expected, shuffled);
 }
 
-TEST(Interruption, OfAStepEndsTheMovingEpisodesOfABatch) {
+TEST(Interruption, AStoppedStepEndsTheMovingEpisodesOfABatch) {
   environments::AcrobotBatch batch({}, 3);
   const std::vector<double> torques(3, 1.0), tolerances(3, 1.0);
   std::vector<std::uint8_t> moving{1, 0, 1}, terminated(3), truncated(3);
@@ -67,7 +67,7 @@ TEST(Interruption, OfAStepEndsTheMovingEpisodesOfABatch) {
     EXPECT_THROW(batch.step(torques, tolerances, moving, results), StopError);
   }
   EXPECT_THROW(batch.step(torques, tolerances, moving, results), std::logic_error);
-  moving = {0, 1, 0};  // which the stopped step did not move
+  moving = {0, 1, 0};  // the acrobot that the stopped step did not move
   EXPECT_NO_THROW(batch.step(torques, tolerances, moving, results));
   batch.reset();
   moving = {1, 1, 1};

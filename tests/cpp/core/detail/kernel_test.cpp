@@ -16,13 +16,13 @@ SDNN_INLINE int sum_body(const int* items, int n) noexcept {
   return sum;
 }
 
-// Each version by hand, so that a test sees which one runs.
+// Every version of this kernel is written by hand and returns its name, to show which one runs.
 inline std::string_view version_portable() { return "portable"; }
 inline std::string_view version_neon() { return "neon"; }
 inline std::string_view version_avx2() { return "avx2"; }
 inline std::string_view version_avx512() { return "avx512"; }
 
-SDNN_INLINE std::string_view mixed_body() { return "made"; }
+SDNN_INLINE std::string_view mixed_body() { return "generated"; }
 inline std::string_view mixed_neon() { return "by hand"; }
 inline std::string_view mixed_avx2() { return "by hand"; }
 
@@ -49,7 +49,7 @@ TEST(Kernel, RunsTheVersionOfTheSelectedInstructionSet) {
 
 TEST(Kernel, PrefersHandWrittenVersions) {
   sdnn::testing::on_every_instruction_set([](auto level) {
-    EXPECT_EQ(mixed(), level == "avx2" || level == "neon" ? "by hand" : "made") << level;
+    EXPECT_EQ(mixed(), level == "avx2" || level == "neon" ? "by hand" : "generated") << level;
   });
 }
 

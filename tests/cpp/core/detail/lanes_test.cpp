@@ -87,7 +87,8 @@ TEST(Lanes, CompareIntoMasks) {
   EXPECT_EQ(pair((every & 6) << 2), (Pair{24, 24}));
 }
 
-// Arguments of every size and both signs, next to the ends of the range and beyond it.
+// Arguments of both signs and of sizes from 2^-22 to 2^17, at the limits of the range and beyond
+// it.
 TEST(Lanes, SinesKeepTheirBits) {
   Random random(1, Stream::exploration);
   std::vector<double> arguments{0.0,
@@ -110,9 +111,9 @@ TEST(Lanes, SinesKeepTheirBits) {
   for (std::size_t i = 0; i < arguments.size(); i += 2) {
     const auto lanes = sin_cos(Lanes<2>::load(&arguments[i]));
     for (std::size_t k = 0; k < 2; ++k) {
-      const auto one = sin_cos(arguments[i + k]);
-      ASSERT_TRUE(same(lanes.sin.v[k], one.sin)) << arguments[i + k];
-      ASSERT_TRUE(same(lanes.cos.v[k], one.cos)) << arguments[i + k];
+      const auto single = sin_cos(arguments[i + k]);
+      ASSERT_TRUE(same(lanes.sin.v[k], single.sin)) << arguments[i + k];
+      ASSERT_TRUE(same(lanes.cos.v[k], single.cos)) << arguments[i + k];
     }
   }
 }

@@ -154,10 +154,10 @@ class Observer {
   static constexpr double kGains[] = {1.0, 0.7, 0.5, 0.35, 0.25, 0.175, 0.125, 0.09};
   static constexpr double kDrifts[] = {3.0, 1.0, 0.3, 0.1, 0.03};
   static constexpr double kLargestGain = 100.0;
-  static constexpr int kRounds = 3;                        // fits, each to the last one's estimates
+  static constexpr int kRounds = 3;  // fits, each to the last one's estimates
   static constexpr int kRefinements = 4;
-  static constexpr std::size_t kMostTransitions = 20'000;  // limits the time of a fit
-  static constexpr std::size_t kMostLevels = 8;            // more actions count as a number
+  static constexpr std::size_t kMostTransitions = 20'000;       // limits the time of a fit
+  static constexpr std::size_t kMostLevels = 8;                 // more actions count as a number
   static constexpr std::size_t kMostFeaturesWithProducts = 17;  // 17 * 18 / 2 = 153 products
   static constexpr double kLeastExplained = 0.7;                // share, see share_of_last_changes
   static constexpr double kFarthest = 6.0;       // of estimates from the mean, in deviations
@@ -402,9 +402,9 @@ class Observer {
   std::vector<bool> circular_;
   std::vector<double> means_, deviations_;   ///< of states
   std::vector<std::int32_t> n_levels_ = {};  ///< of each dimension; 1: an action is a number
-  std::vector<double> levels_ = {};   ///< actions with an indicator, or the zero of a number
-  std::vector<double> weights_ = {};  ///< (n_features, n_inputs)
-  std::vector<double> gains_ = {};    ///< (n_inputs, n_inputs)
+  std::vector<double> levels_ = {};          ///< actions with an indicator, or the zero of a number
+  std::vector<double> weights_ = {};         ///< (n_features, n_inputs)
+  std::vector<double> gains_ = {};           ///< (n_inputs, n_inputs)
   std::vector<double> low_ = {}, high_ = {};  ///< of estimates
   double log_error_ = 0.0, log_error_without_ = 0.0;
 };

@@ -80,14 +80,14 @@ inline void write_products(const SelectiveDesensitization& code, std::span<const
                            std::span<const Bin> others, std::span<std::int32_t> products) {
   code.check_bins(bins);
   code.check_bins(others);
-  const CodedSamples one(code, bins);
-  const CodedSamples other(code, others);
-  assert(products.size() == one.size() * other.size());
+  const CodedSamples coded(code, bins);
+  const CodedSamples coded_others(code, others);
+  assert(products.size() == coded.size() * coded_others.size());
   std::int32_t* product = products.data();
-  for (std::size_t t = 0; t < one.size(); ++t) {
+  for (std::size_t t = 0; t < coded.size(); ++t) {
     core::interruption_point();
-    for (std::size_t s = 0; s < other.size(); ++s) {
-      *product++ = inner_product(one[t], other[s], one.n_words());
+    for (std::size_t s = 0; s < coded_others.size(); ++s) {
+      *product++ = inner_product(coded[t], coded_others[s], coded.n_words());
     }
   }
 }

@@ -34,21 +34,21 @@ struct TernaryCode {
 namespace detail {
 
 /// The contribution of the words [begin, end) to the inner product.
-SDNN_INLINE std::int32_t inner_product_of_words(const TernaryCode& one, const TernaryCode& other,
+SDNN_INLINE std::int32_t inner_product_of_words(const TernaryCode& code, const TernaryCode& other,
                                                 std::size_t begin, std::size_t end) noexcept {
   std::int32_t both = 0;
   std::int32_t unlike = 0;
   for (std::size_t w = begin; w < end; ++w) {
-    const std::uint64_t shared = one.active[w] & other.active[w];
+    const std::uint64_t shared = code.active[w] & other.active[w];
     both += std::popcount(shared);
-    unlike += std::popcount(shared & (one.positive[w] ^ other.positive[w]));
+    unlike += std::popcount(shared & (code.positive[w] ^ other.positive[w]));
   }
   return both - 2 * unlike;
 }
 
-inline std::int32_t inner_product_portable(const TernaryCode& one, const TernaryCode& other,
+inline std::int32_t inner_product_portable(const TernaryCode& code, const TernaryCode& other,
                                            std::size_t n_words) noexcept {
-  return inner_product_of_words(one, other, 0, n_words);
+  return inner_product_of_words(code, other, 0, n_words);
 }
 
 #if SDNN_X86_KERNELS
@@ -58,7 +58,7 @@ inline std::int32_t inner_product_portable(const TernaryCode& one, const Ternary
 }
 
 /// Counts 256 bits at a time: a table in a register has the number of bits of each 4-bit part.
-[[SDNN_TARGET_AVX2]] inline std::int32_t inner_product_avx2(const TernaryCode& one,
+[[SDNN_TARGET_AVX2]] inline std::int32_t inner_product_avx2(const TernaryCode& code,
                                                             const TernaryCode& other,
                                                             std::size_t n_words) {
   constexpr std::size_t kMost = 4 * 31;  // words whose counts, 8 a byte at most, fit into bytes
@@ -80,9 +80,9 @@ inline std::int32_t inner_product_portable(const TernaryCode& one, const Ternary
     __m256i unlike = none;
     for (const std::size_t end = std::min(n_words, w + kMost); w + 4 <= end; w += 4) {
       const __m256i shared =
-          _mm256_and_si256(load_avx2(one.active + w), load_avx2(other.active + w));
+          _mm256_and_si256(load_avx2(code.active + w), load_avx2(other.active + w));
       const __m256i differing =
-          _mm256_xor_si256(load_avx2(one.positive + w), load_avx2(other.positive + w));
+          _mm256_xor_si256(load_avx2(code.positive + w), load_avx2(other.positive + w));
       both = add_counts(both, shared);
       unlike = add_counts(unlike, _mm256_and_si256(shared, differing));
     }
@@ -93,13 +93,13 @@ inline std::int32_t inner_product_portable(const TernaryCode& one, const Ternary
   alignas(32) std::int64_t parts[4];
   _mm256_store_si256(reinterpret_cast<__m256i*>(parts), total);
   return static_cast<std::int32_t>(parts[0] + parts[1] + parts[2] + parts[3]) +
-         inner_product_of_words(one, other, w, n_words);
+         inner_product_of_words(code, other, w, n_words);
 }
 
-[[SDNN_TARGET_AVX2]] inline std::int32_t inner_product_avx512(const TernaryCode& one,
+[[SDNN_TARGET_AVX2]] inline std::int32_t inner_product_avx512(const TernaryCode& code,
                                                               const TernaryCode& other,
                                                               std::size_t n_words) {
-  return inner_product_avx2(one, other, n_words);
+  return inner_product_avx2(code, other, n_words);
 }
 
 #endif  // SDNN_X86_KERNELS
@@ -107,7 +107,7 @@ inline std::int32_t inner_product_portable(const TernaryCode& one, const Ternary
 #if SDNN_NEON_KERNELS
 
 /// Counts 128 bits at a time with the byte counts of NEON.
-inline std::int32_t inner_product_neon(const TernaryCode& one, const TernaryCode& other,
+inline std::int32_t inner_product_neon(const TernaryCode& code, const TernaryCode& other,
                                        std::size_t n_words) noexcept {
   constexpr std::size_t kMost = 2 * 4095;  // words whose counts, 16 at most, fit into 16 bits
   const auto load = [](const std::uint64_t* from) __attribute__((always_inline)) {
@@ -124,8 +124,8 @@ inline std::int32_t inner_product_neon(const TernaryCode& one, const TernaryCode
     uint16x8_t both = vdupq_n_u16(0);
     uint16x8_t unlike = both;
     for (const std::size_t end = std::min(n_words, w + kMost); w + 2 <= end; w += 2) {
-      const uint8x16_t shared = vandq_u8(load(one.active + w), load(other.active + w));
-      const uint8x16_t differing = veorq_u8(load(one.positive + w), load(other.positive + w));
+      const uint8x16_t shared = vandq_u8(load(code.active + w), load(other.active + w));
+      const uint8x16_t differing = veorq_u8(load(code.positive + w), load(other.positive + w));
       both = vpadalq_u8(both, vcntq_u8(shared));
       unlike = vpadalq_u8(unlike, vcntq_u8(vandq_u8(shared, differing)));
     }
@@ -134,7 +134,7 @@ inline std::int32_t inner_product_neon(const TernaryCode& one, const TernaryCode
   }
   return static_cast<std::int32_t>(static_cast<std::int64_t>(n_both) -
                                    2 * static_cast<std::int64_t>(n_unlike)) +
-         inner_product_of_words(one, other, w, n_words);
+         inner_product_of_words(code, other, w, n_words);
 }
 
 #endif  // SDNN_NEON_KERNELS
@@ -143,8 +143,8 @@ inline std::int32_t inner_product_neon(const TernaryCode& one, const TernaryCode
 
 /// The inner product of two codes, fastest if n_words is a multiple of 4.
 SDNN_DISPATCH(std::int32_t, inner_product,
-              (const TernaryCode& one, const TernaryCode& other, std::size_t n_words),
-              (one, other, n_words))
+              (const TernaryCode& code, const TernaryCode& other, std::size_t n_words),
+              (code, other, n_words))
 
 /// Number of entries of a code that are not 0.
 inline std::size_t n_active(const TernaryCode& code, std::size_t n_words) noexcept {
@@ -330,7 +330,7 @@ class ColumnLists {
   ColumnLists(std::size_t n_words, std::size_t words_per_group, std::size_t columns_per_group)
       : first_columns_(n_words),
         words_(n_words + 1),
-        plus_(128 * n_words + 8),
+        plus_(128 * n_words + 8),  // 64 columns a word, twice if by 2, and extra numbers of kernels
         minus_(128 * n_words + 8) {
     for (std::size_t w = 0; w < n_words; ++w) {
       first_columns_[w] = static_cast<std::uint32_t>(w / words_per_group * columns_per_group +

@@ -16,7 +16,8 @@
 
 namespace sdnn::core::detail {
 
-/// The remainder of a polynomial times x, lowest power in the highest bit.
+/// The remainder of a polynomial times x by the generator of CRC-32, 0xedb88320; the lowest power
+/// is in the highest bit.
 constexpr std::uint32_t crc_times_x(std::uint32_t crc) noexcept {
   return (crc >> 1) ^ ((crc & 1U) != 0 ? 0xedb88320U : 0U);
 }
@@ -40,7 +41,8 @@ inline constexpr auto kCrcTables = [] {
 
 /// The remainder `crc` after more bytes, sixteen of them at a time.
 inline std::uint32_t crc_by_tables(std::span<const std::byte> bytes, std::uint32_t crc) noexcept {
-  static_assert(std::endian::native == std::endian::little, "words are taken as they lie there");
+  static_assert(std::endian::native == std::endian::little,
+                "words are read in the order of the bytes");
   for (; bytes.size() >= 16; bytes = bytes.subspan(16)) {
     std::array<std::uint64_t, 2> words{};
     std::memcpy(words.data(), bytes.data(), sizeof(words));
@@ -63,7 +65,7 @@ inline std::uint32_t crc_by_tables(std::span<const std::byte> bytes, std::uint32
 
 /// x^n, for carry-less products of numbers whose lowest power is in the highest bit.
 constexpr long long crc_power_of_x(int n) noexcept {
-  std::uint32_t crc = 0x80000000U;
+  std::uint32_t crc = 0x80000000U;  // x^0
   for (int i = 0; i < n; ++i) crc = crc_times_x(crc);
   return static_cast<long long>(crc) * 2;
 }

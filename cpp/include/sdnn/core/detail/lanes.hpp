@@ -238,7 +238,8 @@ struct IntegerRegister {
     std::memcpy(&other, from, sizeof other);
     v = (Vector)((Wrapping)v - other);
   }
-  /// Rises to the size of each integer that has a larger one; none may be the least of its type.
+  /// Raises each integer to the size of the one in memory, if that is larger; none of these may be
+  /// the least of its type.
   SDNN_INLINE void rise_to_size(const Integer* from) noexcept {
     Vector other;
     std::memcpy(&other, from, sizeof other);
