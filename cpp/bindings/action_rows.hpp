@@ -57,7 +57,7 @@ class ActionRows {
  private:
   std::size_t n_rows() const { return static_cast<std::size_t>(array_.size()) / n_columns_; }
 
-  /// Calls `use` with a number of the array's type; false if that is an unusual one.
+  /// Calls `use` with a zero of the array's number type; false if that type is not handled here.
   bool with_type(const auto& use) const {
     if (type_ == pybind11::dtype::num_of<double>()) return use(double()), true;
     if (type_ == pybind11::dtype::num_of<float>()) return use(float()), true;

@@ -119,7 +119,7 @@ inline coding::PatternTable table_of(const ArrayArgument<std::int8_t>& signs) {
 inline std::vector<coding::PatternTable> tables_of(
     const std::vector<ArrayArgument<std::int8_t>>& signs) {
   std::vector<coding::PatternTable> tables;
-  for (const auto& one : signs) tables.push_back(table_of(one));
+  for (const auto& input : signs) tables.push_back(table_of(input));
   return tables;
 }
 

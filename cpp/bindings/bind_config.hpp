@@ -102,7 +102,7 @@ struct Field {
   void* value;
 };
 
-/// Reads a Python value; false if it is of another type. True is no number, and 1.0 no whole one.
+/// Reads a Python value; false if it has another type: True is no number, 1.0 is no integer.
 template <class Value>
 bool read_value(pybind11::handle source, Value& value, const Field& field);
 
@@ -139,9 +139,9 @@ bool read_value(pybind11::handle source, Value& value, const Field& field) {
     if (is_text || PySequence_Check(source.ptr()) == 0) return false;
     value.clear();
     for (const py::handle item : source) {
-      typename Value::value_type one{};
-      if (!read_value(item, one, field)) return false;
-      value.push_back(one);
+      typename Value::value_type element{};
+      if (!read_value(item, element, field)) return false;
+      value.push_back(element);
     }
     return true;
   } else if constexpr (core::HasWords<Value>) {

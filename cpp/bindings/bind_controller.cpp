@@ -52,7 +52,7 @@ std::pair<std::string, std::vector<std::size_t>> described(const agents::Observe
   return {};
 }
 
-/// Whether there are threads that could run Python while this one works without the GIL.
+/// Whether other threads could run Python while the calling thread works without the GIL.
 bool has_other_threads() {
   return PyThreadState_Next(PyInterpreterState_ThreadHead(PyInterpreterState_Get())) != nullptr;
 }
@@ -103,7 +103,7 @@ using MaskArgument = std::optional<ArrayArgument<std::uint8_t>>;
 agents::ActionMask mask_of(const MaskArgument& mask) {
   return mask ? bindings::flat(*mask) : agents::ActionMask();
 }
-/// Returns the mask of an environment, where each has a row.
+/// Returns the row of `masks` for an environment; without masks, the mask that allows all.
 agents::ActionMask mask_of(const MaskArgument& masks, const char* name, std::size_t environment) {
   if (!masks) return {};
   const auto rows = bindings::matrix(*masks, name);
@@ -117,16 +117,16 @@ agents::ActionMask mask_of(const MaskArgument& masks, const char* name, std::siz
 std::span<const double> row(const ArrayArgument<double>& rows, const char* name,
                             std::size_t n_columns, std::size_t i) {
   const auto numbers = bindings::flat(rows);
-  if (i >= numbers.size() / n_columns) {  // only a bad one's text costs memory
+  if (i >= numbers.size() / n_columns) {  // only the text for a bad row costs memory
     core::require(false, name, std::to_string(n_columns) + " numbers for each environment",
                   numbers.size());
   }
   return numbers.subspan(n_columns * i, n_columns);
 }
 
-/// Learns in environments in order: at most `most`, and up to the end of an episode. After each but
-/// that last one, the progress is set to that of `goal` steps, if there is one; `n_steps` were
-/// learned before. Returns how many were learned: all before the first that cannot be.
+/// Learns the steps of the environments in order: at most `most`, and none after the first that
+/// ends an episode. After every other step, progress becomes (steps so far) / `goal`, if given,
+/// counting from `n_steps`. Returns how many were learned: all before the first that cannot be.
 std::size_t learn_each(Controller& controller, const ArrayArgument<double>& observations,
                        const py::object& actions, const py::list& rewards,
                        const ArrayArgument<double>& next_observations, const py::list& terminated,
@@ -384,9 +384,10 @@ void bind_controller(py::module_& module) {
           "range_use",
           [](const Controller& self) {
             std::vector<std::optional<std::pair<double, double>>> use;
-            for (const auto& one : self.range_use()) {
-              use.push_back(one ? std::optional(std::pair(one->share_used, one->share_beyond))
-                                : std::nullopt);
+            for (const auto& variable : self.range_use()) {
+              use.push_back(
+                  variable ? std::optional(std::pair(variable->share_used, variable->share_beyond))
+                           : std::nullopt);
             }
             return use;
           },

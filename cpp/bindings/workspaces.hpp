@@ -19,7 +19,7 @@ typename Network::Workspace& workspace_of(const Network& network) {
   };
   thread_local std::list<Kept> kept;  // the latest first
   const auto found =
-      std::ranges::find(kept, network.identity(), [](const Kept& one) { return one.network; });
+      std::ranges::find(kept, network.identity(), [](const Kept& entry) { return entry.network; });
   if (found != kept.end()) {
     kept.splice(kept.begin(), kept, found);
   } else {

@@ -112,16 +112,16 @@ class Acrobot {
     const double limit_1 = config().goal_velocity_1 * goal_tolerance;
     const double limit_2 = config().goal_velocity_2 * goal_tolerance;
 #if SDNN_LANES
-    PairedForm::State now{core::Lanes<2>::load(state_.data()),
-                          core::Lanes<2>::load(state_.data() + 2)};
-    const bool goal = dynamics_.integrate<PairedForm>(now, torque, limit_1, limit_2, true);
-    now[0].store(state_.data());
-    now[1].store(state_.data() + 2);
+    PairedForm::State current{core::Lanes<2>::load(state_.data()),
+                              core::Lanes<2>::load(state_.data() + 2)};
+    const bool goal = dynamics_.integrate<PairedForm>(current, torque, limit_1, limit_2, true);
+    current[0].store(state_.data());
+    current[1].store(state_.data() + 2);
 #else
     using Form = SeparateForm<double>;
-    Form::State now{state_[0], state_[1], state_[2], state_[3]};
-    const bool goal = dynamics_.integrate<Form>(now, torque, limit_1, limit_2, true);
-    state_ = {now[0], now[1], now[2], now[3]};
+    Form::State current{state_[0], state_[1], state_[2], state_[3]};
+    const bool goal = dynamics_.integrate<Form>(current, torque, limit_1, limit_2, true);
+    state_ = {current[0], current[1], current[2], current[3]};
 #endif
     return goal;
   }

@@ -173,7 +173,7 @@ class AcrobotBatch {
   /// Moves the batch in short parts. An interruption between them ends the episodes of all moving
   /// acrobots.
   void move_all(std::span<const std::uint8_t> moving) {
-    constexpr double kStepsPerPoint = 1 << 20;
+    constexpr double kStepsPerPoint = 1 << 20;  // these take a fraction of a second
     const double steps = std::nearbyint(config().decision_interval / config().integration_step);
     const std::size_t part =
         core::round_up(static_cast<std::size_t>(kStepsPerPoint / steps) + 1, kAcrobotLanes);

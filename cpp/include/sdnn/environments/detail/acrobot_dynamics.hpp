@@ -52,14 +52,14 @@ template <class Real>
 struct AcrobotAngles {
   Real sin_1, cos_1, sin_2, cos_2, sin_12, cos_12;
 
-  SDNN_INLINE static AcrobotAngles of(const core::BasicSinCos<Real>& one,
-                                      const core::BasicSinCos<Real>& two) noexcept {
-    return {one.sin,
-            one.cos,
-            two.sin,
-            two.cos,
-            one.sin * two.cos + one.cos * two.sin,
-            one.cos * two.cos - one.sin * two.sin};
+  SDNN_INLINE static AcrobotAngles of(const core::BasicSinCos<Real>& joint_1,
+                                      const core::BasicSinCos<Real>& joint_2) noexcept {
+    return {joint_1.sin,
+            joint_1.cos,
+            joint_2.sin,
+            joint_2.cos,
+            joint_1.sin * joint_2.cos + joint_1.cos * joint_2.sin,
+            joint_1.cos * joint_2.cos - joint_1.sin * joint_2.sin};
   }
 };
 
@@ -142,14 +142,14 @@ class AcrobotDynamics {
     using Real = typename Form::Number;
     const Real d12 = inertia_22_ + coupling_ * at.cos_2;
     const Real d11 = inertia_11_ + 2.0 * coupling_ * at.cos_2;
-    const Real inverse = 1.0 / (d11 * inertia_22_ - d12 * d12);
+    const Real inverse_determinant = 1.0 / (d11 * inertia_22_ - d12 * d12);
     const Real v1 = Form::velocity_1(state), v2 = Form::velocity_2(state);
-    const Real swirl = coupling_ * at.sin_2;
+    const Real coriolis = coupling_ * at.sin_2;
     const Real phi2 = gravity_2_ * at.sin_12;
-    const Real right_1 = swirl * (v2 * (v2 + 2.0 * v1)) - (gravity_1_ * at.sin_1 + phi2);
-    const Real right_2 = (torque - swirl * (v1 * v1)) - phi2;
-    return Form::slope(state, (inertia_22_ * right_1 - d12 * right_2) * inverse,
-                       (d11 * right_2 - d12 * right_1) * inverse);
+    const Real right_1 = coriolis * (v2 * (v2 + 2.0 * v1)) - (gravity_1_ * at.sin_1 + phi2);
+    const Real right_2 = (torque - coriolis * (v1 * v1)) - phi2;
+    return Form::slope(state, (inertia_22_ * right_1 - d12 * right_2) * inverse_determinant,
+                       (d11 * right_2 - d12 * right_1) * inverse_determinant);
   }
 
   /// Height of the tip above joint 1, in m.
@@ -173,28 +173,28 @@ class AcrobotDynamics {
     const auto slope = [this, &torque](const State& at_state) SDNN_INLINE_LAMBDA {
       return derivative<Form>(at_state, Form::angles(at_state), torque);
     };
-    // All lanes step until the last one has arrived; `state` takes the numbers of those that do.
-    State now = state;
+    // All lanes step until the last has arrived; a lane that arrives stores its numbers in `state`.
+    State current = state;
     Mask under_way = moving;
-    auto at = Form::angles(now);
+    auto at = Form::angles(current);
     for (int i = n_integration_steps_; i > 0; --i) {
-      now = runge_kutta_step(slope, now, derivative<Form>(now, at, torque), time_step_);
-      at = Form::angles(now);
+      current = runge_kutta_step(slope, current, derivative<Form>(current, at, torque), time_step_);
+      at = Form::angles(current);
       if (!every_step && i > 1) continue;
       Mask arrived = core::both(tip_height(at) >= config_.goal_height, under_way);
       if (!core::any(arrived)) continue;
-      const Mask slow = core::both(core::magnitude(Form::velocity_1(now)) < limit_1,
-                                   core::magnitude(Form::velocity_2(now)) < limit_2);
+      const Mask slow = core::both(core::magnitude(Form::velocity_1(current)) < limit_1,
+                                   core::magnitude(Form::velocity_2(current)) < limit_2);
       arrived = core::both(arrived, slow);
       if (!core::any(arrived)) continue;
       core::unrolled<kSize>([&](std::size_t k) SDNN_INLINE_LAMBDA {
-        state[k] = core::select(arrived, now[k], state[k]);
+        state[k] = core::select(arrived, current[k], state[k]);
       });
       under_way = core::first_only(under_way, arrived);
       if (!core::any(under_way)) return moving;
     }
     core::unrolled<kSize>([&](std::size_t k) SDNN_INLINE_LAMBDA {
-      state[k] = core::select(under_way, now[k], state[k]);
+      state[k] = core::select(under_way, current[k], state[k]);
     });
     return core::first_only(moving, under_way);
   }
@@ -202,8 +202,8 @@ class AcrobotDynamics {
   /// Time derivative of `state` under `torque` (N m).
   AcrobotState derivative(const AcrobotState& state, double torque) const noexcept {
     using Form = SeparateForm<double>;
-    const Form::State now = separate(state);
-    const Form::State slope = derivative<Form>(now, Form::angles(now), torque);
+    const Form::State current = separate(state);
+    const Form::State slope = derivative<Form>(current, Form::angles(current), torque);
     return {slope[0], slope[1], slope[2], slope[3]};
   }
 
@@ -212,11 +212,11 @@ class AcrobotDynamics {
     return tip_height(SeparateForm<double>::angles(separate(state)));
   }
 
-  /// Spong's d11, d12 = d21, d22 in kg m^2: accelerations of the joints to torques on them.
+  /// Maps accelerations of the joints to torques on them: Spong's d11, d12 = d21, d22 in kg m^2.
   Eigen::Matrix2d mass_matrix(double theta2) const noexcept {
-    const double bend = coupling_ * core::sin_cos(theta2).cos;
-    const double d12 = inertia_22_ + bend;
-    return Eigen::Matrix2d{{inertia_11_ + 2.0 * bend, d12}, {d12, inertia_22_}};
+    const double coupling = coupling_ * core::sin_cos(theta2).cos;
+    const double d12 = inertia_22_ + coupling;
+    return Eigen::Matrix2d{{inertia_11_ + 2.0 * coupling, d12}, {d12, inertia_22_}};
   }
 
   /// Kinetic and potential energy in J, the latter counted from the height of joint 1.
