@@ -16,7 +16,8 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 from sklearn.kernel_ridge import KernelRidge
 from sklearn.linear_model import LogisticRegression, Ridge
-from sklearn.model_selection import GridSearchCV
+from sklearn.metrics import accuracy_score, r2_score
+from sklearn.model_selection import GridSearchCV, train_test_split
 from sklearn.neural_network import MLPClassifier, MLPRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
@@ -69,6 +70,51 @@ class WithClasses(ClassifierMixin, BaseEstimator):
 
     def predict_proba(self, X):
         return self.model_.predict_proba(X)
+
+
+class RecursiveFeatureMachine(BaseEstimator):
+    """xRFM with default settings; a fifth of the sample decides when it stops."""
+
+    def __init__(self, is_classifier=False, seed=0):
+        self.is_classifier = is_classifier
+        self.seed = seed
+
+    def fit(self, X, y):
+        from xrfm import xRFM  # which needs PyTorch, but stored results do not
+
+        self.scaler_ = StandardScaler().fit(X)
+        if self.is_classifier:
+            self.classes_, targets = np.unique(y, return_inverse=True)
+        else:
+            self.mean_, self.width_ = np.mean(y), np.std(y)
+            targets = (np.asarray(y, dtype=float) - self.mean_) / self.width_
+        X, X_held, y, y_held = train_test_split(
+            self._inputs(X), targets, test_size=0.2, random_state=self.seed,
+            stratify=targets if self.is_classifier else None,
+        )  # fmt: skip
+        metric = "accuracy" if self.is_classifier else "mse"
+        self.model_ = xRFM(
+            device="cpu", tuning_metric=metric, n_threads=1, random_state=self.seed, verbose=False
+        )
+        self.model_.fit(X, y, X_held, y_held)
+        return self
+
+    def _inputs(self, X):
+        return self.scaler_.transform(X).astype(np.float32)
+
+    def predict_proba(self, X):
+        return np.asarray(self.model_.predict_proba(self._inputs(X)))
+
+    def predict(self, X):
+        if self.is_classifier:
+            return self.classes_[self.predict_proba(X).argmax(axis=1)]
+        return (
+            np.asarray(self.model_.predict(self._inputs(X))).reshape(-1) * self.width_ + self.mean_
+        )
+
+    def score(self, X, y):
+        score = accuracy_score if self.is_classifier else r2_score
+        return score(y, self.predict(X))
 
 
 def codings(*length_scales):

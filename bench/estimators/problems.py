@@ -19,7 +19,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np
-from baselines import WithClasses, gaussian_process, scaled
+from baselines import RecursiveFeatureMachine, WithClasses, gaussian_process, scaled
 from catboost import CatBoostClassifier, CatBoostRegressor
 from demonstration import target, training_points
 from lightgbm import LGBMClassifier, LGBMRegressor
@@ -222,6 +222,7 @@ REGRESSORS = {
     "LightGBM": lambda seed, n_inputs: LGBMRegressor(random_state=seed, n_jobs=1, verbose=-1),
     "XGBoost": lambda seed, n_inputs: XGBRegressor(random_state=seed, n_jobs=1),
     "random forest": lambda seed, n_inputs: RandomForestRegressor(random_state=seed),
+    "xRFM": lambda seed, n_inputs: RecursiveFeatureMachine(seed=seed),
     "SVM": lambda seed, n_inputs: scaled(SVR()),
     "Gaussian process": lambda seed, n_inputs: gaussian_process(n_inputs, 0.1),
     "MLP": lambda seed, n_inputs: scaled(MLPRegressor(random_state=seed)),
@@ -244,6 +245,7 @@ CLASSIFIERS = {
     "LightGBM": lambda seed, n_inputs: LGBMClassifier(random_state=seed, n_jobs=1, verbose=-1),
     "XGBoost": lambda seed, n_inputs: WithClasses(XGBClassifier(random_state=seed, n_jobs=1)),
     "random forest": lambda seed, n_inputs: RandomForestClassifier(random_state=seed),
+    "xRFM": lambda seed, n_inputs: RecursiveFeatureMachine(is_classifier=True, seed=seed),
     "SVM": lambda seed, n_inputs: scaled(SVC()),
     "MLP": lambda seed, n_inputs: scaled(MLPClassifier(random_state=seed)),
     "neighbours": lambda seed, n_inputs: scaled(KNeighborsClassifier()),
@@ -373,7 +375,7 @@ def draw(results, path):
         "SDNN": "#1f5fa8", "SDNN kernel ridge": "#6fa8dc", "SDNN, last epoch": "#0b2f57",
         "SDNN, 4,000 columns": "#36b0b0", "SDNN, features selected": "#7b61c4",
         "gradient boosting": "#d9822b", "CatBoost": "#b3541e", "LightGBM": "#e8b04b",
-        "XGBoost": "#f2d0a4",
+        "XGBoost": "#f2d0a4", "xRFM": "#4a4a4a",
         "random forest": "#5b8c5a", "SVM": "#a05195", "Gaussian process": "#c2453a",
         "MLP": "#8a7f3d", "neighbours": "#888888", "linear": "#bbbbbb",
     }  # fmt: skip

@@ -23,7 +23,7 @@ from catboost import CatBoost
 from lightgbm import LGBMModel
 from measured import measure_missing, measured, options
 from page import show
-from real_data import CLASSIFICATION, REGRESSION, is_word, samples
+from real_data import CLASSIFICATION, NUMBERS, REGRESSION, is_word, samples
 from sklearn.compose import ColumnTransformer
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.metrics import log_loss, roc_auc_score
@@ -110,9 +110,7 @@ def of_classes(model, X, y):
 def measure(problem, name, fold):
     """Score, AUC and calibration; processor seconds of fitting, microseconds of a prediction."""
     X, y = samples(problem)
-    models, splitter = (
-        (REGRESSORS, KFold) if problem in REGRESSION else (CLASSIFIERS, StratifiedKFold)
-    )
+    models, splitter = (REGRESSORS, KFold) if problem in NUMBERS else (CLASSIFIERS, StratifiedKFold)
     folds = splitter(N_FOLDS, shuffle=True, random_state=0).split(X, y)
     train, test = list(folds)[fold]
     model = make_model(models[name], X, fold)
@@ -122,7 +120,7 @@ def measure(problem, name, fold):
     score = model.score(X.iloc[test], y[test])
     us = 1e6 * (time.process_time() - fitted) / len(test)
     results = {"score": round(float(score), 5), "fit_s": round(fitted - begun, 3)}
-    if problem in CLASSIFICATION:
+    if problem not in NUMBERS:
         results |= of_classes(model, X.iloc[test], y[test])
     return {**results, "predict_us": round(us, 1)}
 

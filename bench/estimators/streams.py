@@ -44,10 +44,10 @@ NETWORK = {"hidden_layer_sizes": (64, 64), "learning_rate_init": 3e-3}
 class Perceptron:
     """scikit-learn's MLP by river's interface, two hidden layers, one gradient step a sample."""
 
-    def __init__(self, seed):
+    def __init__(self, seed, **options):
         self.scaler = preprocessing.StandardScaler()
         self.target = preprocessing.StandardScaler()
-        self.model = MLPRegressor(**NETWORK, random_state=seed)
+        self.model = MLPRegressor(**NETWORK | options, random_state=seed)
         self.is_fitted = False
 
     def _row(self, x):
@@ -72,9 +72,9 @@ class Perceptron:
 class PerceptronOfClasses(Perceptron):
     """A perceptron for labels, all of which it knows beforehand."""
 
-    def __init__(self, seed):
+    def __init__(self, seed, **options):
         super().__init__(seed)
-        self.model = MLPClassifier(**NETWORK, random_state=seed)
+        self.model = MLPClassifier(**NETWORK | options, random_state=seed)
         self.classes = []
 
     def predict_one(self, x):
@@ -129,8 +129,12 @@ CLASSIFIERS = {
 
 def measure(stream, name, seed):
     """R2 or accuracy, the errors of windows, and microseconds of processor time a sample."""
-    xs, ys = samples(stream, seed)
-    model = (REGRESSORS if stream in REGRESSION else CLASSIFIERS)[name](seed)
+    make = (REGRESSORS if stream in REGRESSION else CLASSIFIERS)[name]
+    return follow(make(seed), stream, *samples(stream, seed))
+
+
+def follow(model, stream, xs, ys):
+    """Predict and learn samples one by one."""
     if isinstance(model, PerceptronOfClasses):
         model.classes = sorted(set(ys))
     guesses = []
@@ -153,14 +157,14 @@ def measure(stream, name, seed):
 # Figures and tables of the measurements.
 
 
-def complete(rows):
+def complete(rows, regressors=REGRESSORS, classifiers=CLASSIFIERS):
     """Rows by stream and model, of the seeds that all models of a stream have."""
     of_seeds = defaultdict(dict)
     for (stream, model, seed), row in rows.items():
         of_seeds[stream, seed][model] = row
     results = defaultdict(list)
     for (stream, _), of_models in of_seeds.items():
-        if set(REGRESSORS if stream in REGRESSION else CLASSIFIERS) <= set(of_models):
+        if set(regressors if stream in REGRESSION else classifiers) <= set(of_models):
             for model, row in of_models.items():
                 results[stream, model].append(row)
     return results
