@@ -92,12 +92,15 @@ def main():
     results = defaultdict(list)
     for (problem, model, _), row in measured(KIND, arguments.folder).items():
         results[problem, model].append(row)
+    complete = {key: rows for key, rows in results.items() if len(rows) == real.N_FOLDS}
+    results = defaultdict(list, complete)
     columns = {}
-    for title, (what, sign, data, models) in SCORES.items():
-        middles = problems.middles_of(results, data, models, what, np.mean)
-        columns |= columns_of(title, sign * middles, list(models))
+    for title, (what, sign, data, makers) in SCORES.items():
+        models = [name for name in makers if any((problem, name) in results for problem in data)]
+        middles = sign * problems.middles_of(results, data, models, what, np.mean)
+        columns |= columns_of(title, middles, models)
         if arguments.full:
-            print(problems.table(data, models, sign * middles))
+            print(problems.table(data, models, middles))
     columns["log loss"] = mean_column(results, "log_loss")
     columns["calibration error"] = mean_column(results, "calibration")
     show({"data kept apart": problems.by_model(columns)}, arguments.folder / "problems.md")

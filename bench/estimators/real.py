@@ -45,11 +45,14 @@ LEFT_OUT = {
     ("leaves", "CatBoost"),
 }
 """Fits of four minutes and more."""
+WITH_PROBABILITIES = {name: make for name, make in CLASSIFIERS.items() if name != "SVM"}
 TABLES = {
-    "R2": ("score", REGRESSION, REGRESSORS),
-    "accuracy": ("score", CLASSIFICATION, CLASSIFIERS),
-    "AUC": ("auc", CLASSIFICATION, CLASSIFIERS),
+    "R2": ("score", 1, REGRESSION, REGRESSORS),
+    "accuracy": ("score", 1, CLASSIFICATION, CLASSIFIERS),
+    "AUC": ("auc", 1, CLASSIFICATION, CLASSIFIERS),
+    "log loss": ("log_loss", -1, CLASSIFICATION, WITH_PROBABILITIES),
 }
+"""Name, sign, data and models of each score."""
 SHOWN = (
     "SDNN", "SDNN kernel ridge", "CatBoost", "gradient boosting", "Gaussian process", "linear"
 )  # fmt: skip
@@ -168,8 +171,8 @@ def main():
     for (problem, model, _), row in measured(KIND, arguments.folder).items():
         results[problem, model].append(row)
     summary, tables = {}, {}
-    for title, (what, data, models) in TABLES.items():
-        middles = problems.middles_of(results, data, models, what, np.mean)
+    for title, (what, sign, data, models) in TABLES.items():
+        middles = sign * problems.middles_of(results, data, models, what, np.mean)
         summary |= problems.rank_columns(title, models, middles)
         if title == "R2":
             tables["R2, measured data"] = problems.table(data, models, middles, SHOWN)
