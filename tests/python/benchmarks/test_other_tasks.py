@@ -30,13 +30,14 @@ def scripts():
     try:
         import measured
         import page
+        import policies
         import report
         import run
         import studies
 
         yield argparse.Namespace(
-            measured=measured, page=page, report=report, run=run, studies=studies,
-            study=run.StudyFile(run.STUDY),
+            measured=measured, page=page, policies=policies, report=report, run=run,
+            studies=studies, study=run.StudyFile(run.STUDY),
         )  # fmt: skip
     finally:
         sys.path[:] = path
@@ -57,6 +58,14 @@ def test_the_benchmark_page_has_the_tables_of_the_stored_trials(scripts):
     tables = report.tables(study, scripts.studies.curves(run.KIND, study, options_of(EVIDENCE)))
     text = (EVIDENCE / "benchmarks.md").read_text()
     assert scripts.page.with_tables(text, tables) == text, "run bench/other_tasks/run.py --redraw"
+
+
+def test_the_benchmark_page_has_the_table_of_stored_policies(scripts):
+    policies = scripts.policies
+    table = policies.table(scripts.measured.measured(policies.KIND))
+    text = (EVIDENCE / "benchmarks.md").read_text()
+    same = scripts.page.with_tables(text, {"policies": table})
+    assert same == text, "run bench/other_tasks/policies.py --redraw"
 
 
 def test_every_stored_curve_is_complete(scripts):
