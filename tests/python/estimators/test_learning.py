@@ -405,8 +405,8 @@ def test_averaged_networks_count_towards_the_memory_limit():
         ({"max_iter": 16, "early_stopping": True, "refit": True}, 5),
     ]:
         limit = n_networks * weights + table_bytes
-        SDNNRegressor(**options, **changes, training="unaveraged", memory_limit=limit).fit(X, Y)
-        model = SDNNRegressor(**options, **changes, training="unaveraged", memory_limit=limit - 1)
+        SDNNRegressor(**options, **changes, training="plain", memory_limit=limit).fit(X, Y)
+        model = SDNNRegressor(**options, **changes, training="plain", memory_limit=limit - 1)
         with pytest.raises(ValueError, match=f"{n_networks} networks"):
             model.fit(X, Y)
         model.partial_fit(X, Y).learn_one(X[0], Y[0])  # which average nothing
