@@ -151,7 +151,9 @@ def table(results) -> str:
                 )
                 cell = f"{median} ({low} to {high})"
                 if way != "final":
-                    n_better = sum(value > final.get(seed, np.inf) for seed, value in values.items())
+                    n_better = sum(
+                        value > final.get(seed, np.inf) for seed, value in values.items()
+                    )
                     cell += f", {n_better} of {len(values)}"
             cells.append(cell)
         rows.append((title, *cells))

@@ -61,7 +61,7 @@ def test_noise_is_left_out_however_many_inputs_it_has():
         agent.train(env, steps=1001, seed=1)  # inputs are chosen after 1,000
         chosen = [variable for _, variables in agent.inputs for variable in variables]
         assert chosen[:4] == [0, 1, 2, 3], "the variables of CartPole"
-        # One of a hundred numbers may seem relevant by chance.
+        # A single one of a hundred numbers may seem relevant by chance.
         assert len(chosen) <= (5 if kind == "numbers" else 4)
 
 

@@ -33,7 +33,7 @@ def longest_run(actions):
 
 
 def test_random_actions_are_repeated_while_all_rewards_were_zero():
-    # Of 1,000 actions drawn of four, a run of 15 has a probability of 1000 / 4^14.
+    # Among 1,000 actions drawn of four, a run of 15 has a probability of 1000 / 4^14.
     no_rewards = [0.0] * 1000
     assert longest_run(act_and_learn(new_agent(), no_rewards)) >= 40
     # Two runs of the same action may meet.

@@ -198,7 +198,7 @@ def test_small_settings_fit_a_small_processor(n_inputs, groups):
         model = SDNNRegressor(**settings).fit(X, y)
     assert {index for pair in model.pairs_ for index in pair} == set(range(n_inputs))
     greedy = estimator_header(model, "model", flash_bytes=2**17)
-    # Of 128 kB of flash and 64 kB of RAM, a prediction takes 4 kB of RAM, learning all of it, with
+    # In 128 kB of flash and 64 kB of RAM, a prediction takes 4 kB of RAM, learning all of it, with
     # the arrays on the stack and the 640 bytes that the header states for all else there.
     assert greedy.ram_bytes < 2**12
     learner = estimator_header(model, "model", learning=True)
