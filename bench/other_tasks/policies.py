@@ -151,10 +151,8 @@ def table(results) -> str:
                 )
                 cell = f"{median} ({low} to {high})"
                 if way != "final":
-                    n_better = sum(
-                        value > final.get(seed, np.inf) for seed, value in values.items()
-                    )
-                    cell += f", {n_better} of {len(values)}"
+                    better = [value > final.get(seed, np.inf) for seed, value in values.items()]
+                    cell += f", {sum(better)} of {len(better)}"
             cells.append(cell)
         rows.append((title, *cells))
     titles = (f"{task} ({len(returns[task, 'final'])} seeds)" for task in tasks)
