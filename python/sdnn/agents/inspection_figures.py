@@ -209,9 +209,12 @@ def _whole_ticks(axes: Axes, actions: Floats) -> None:
 
 
 def draw_influences(measured: Sequence[Influence], *, narrow: bool = False) -> Figure:
-    """Draw the influence of each input on values and on actions as bars."""
+    """Draw the influence of each input on values and on actions as bars.
+
+    ``measured`` is in the order of `influences`, the largest first; the first ones are drawn.
+    """
     shown = list(measured)[:MOST_BARS]
-    height = 1.0 + 0.27 * len(shown)
+    height = 1.0 + 0.27 * len(shown)  # in inches: title and axis, and a bar for each input
     figure = new_figure(*((NARROW_WIDTH, 2.0 * height) if narrow else (WIDTH, height)))
     panels = figure.subplots(*((2, 1) if narrow else (1, 2)), sharey=not narrow)
     heights = np.arange(len(shown))

@@ -258,7 +258,10 @@ class BaseSDNN(Fitted, CodedInputs):
     def _partial_fit(
         self, X: ArrayLike, y: ArrayLike, classes: ArrayLike | None, sample_weight: ArrayLike | None
     ) -> Self:
-        """Present samples in order, once or by their weights; an error changes nothing."""
+        """Present samples in order, each once or as often as its weight says.
+
+        A copy learns, and then replaces this model, so that an error changes nothing.
+        """
         work = self._copy_to_train()
         first = not hasattr(self, "network_")
         if first:
@@ -273,7 +276,7 @@ class BaseSDNN(Fitted, CodedInputs):
             work._note_inputs(table)
         weights = sample_weights(sample_weight, len(table))
         if weights is not None:
-            rows = samples_of_epoch(len(table), weights, 0, work._n_weighted)
+            rows = samples_of_epoch(len(table), weights, epoch=0, n_before=work._n_weighted)
             work._n_weighted += len(table)
             table, observed = table[rows], observed[rows]
         if len(table):

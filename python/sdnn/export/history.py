@@ -89,7 +89,11 @@ class StateHistory:
 
     @property
     def function_bytes(self) -> int:
-        """The bytes of constants of sine, cosine and atan2, where they are used."""
+        """The bytes of the tables of coefficients in C, of the functions that the inputs need.
+
+        An input of kind "angle" is atan2 of two readings. An observer also takes sine and cosine of
+        these, and of readings that are angles themselves ("circular").
+        """
         kinds = {source.kind for source in self.inputs} if self.is_needed else set[str]()
         n_numbers = 23 if "angle" in kinds else 0  # coefficients of atan2
         if self.kind == "observer" and kinds & {"angle", "circular"}:

@@ -78,11 +78,12 @@ class Learner(Writer[Network]):
 
     def restore(self, whole: bytes) -> None:
         """Set the agent's state from an image; ValueError if it is damaged or another agent's."""
-        (image,), state = np.frombuffer(whole, self.layout(), 1), self.agent._state_of("agent")
+        (image,) = np.frombuffer(whole, self.layout(), 1)
+        state = self.agent._state_of("agent")
         for stream, words in zip(self.streams, image["words"], strict=True):
             state[f"{stream}.words"] = words.copy()
         fields = image.dtype.names or ()
-        state.pop("n_random_left", None)
+        state.pop("n_random_left", None)  # an agent's state has it only where it is not 0
         if "n_random_left" in fields and (n_left := image["n_random_left"]):
             state["n_random_left"] = np.array(n_left, np.int32)
         self.recall(image, state)

@@ -334,12 +334,12 @@ def test_impossible_durations_are_refused_and_change_nothing(agent_class, dt):
             learn_from(agent, [Transition([0.5], action, 1.0, [0.5], False), transition])
     assert all(np.array_equal(values, agent.state()[name]) for name, values in before.items())
 
-    class Bad(Courier):
+    class BadThirdStep(Courier):
         def step(self, action):
             *outcome, info = super().step(action)
             return *outcome, info | ({"dt": dt} if self.n == 3 else {})
 
-    env = Bad(True, courier(True).action_space)
+    env = BadThirdStep(True, courier(True).action_space)
     with pytest.raises(UnusableStepError, match=r"step 3 of episode 0\): dt must be"):
         agent.train(env, steps=10)
     with pytest.raises(UnusableStepError, match=r"\bdt\b"):

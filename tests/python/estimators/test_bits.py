@@ -74,7 +74,7 @@ def test_the_regressor_has_the_bits_of_its_transcription(problem, n_outputs, n_o
     layer = transcribed(model)
     bins = model.network_.input_code.bins(X)
     slow = estimator_transcription.PDeltaTrainer(layer, bins, counts, share)
-    fast = model._trainer(bins, counts, 3)
+    fast = model._trainer(bins, counts, n_epochs=3)
     for order in orders:
         assert tuple(fast.present(np.array(order, dtype=np.int32))) == slow.present(order)
     fast.synchronize()

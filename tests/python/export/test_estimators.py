@@ -305,12 +305,12 @@ def test_estimators_without_a_form_in_c_are_refused_with_a_remedy():
             estimator_header(model, "model")
 
 
-def test_weights_beyond_16_bits_are_refused():
+def test_weights_beyond_the_two_bytes_of_a_header_are_refused():
     model, _ = fitted("one-pair")
     changed = copy.deepcopy(model)
     layer = model.network_.layer
     weights = layer.weights
-    weights[0, 0] = 40_000  # 32,512 = 127 * 256 is the largest of two bytes, each below 128
+    weights[0, 0] = 40_000  # above the limit of 127 * 256 = 32,512
     code = model.network_.input_code
     changed.network_ = Network(code, 1, weights=weights, thresholds=layer.thresholds)
     for learning in (False, True):

@@ -221,8 +221,8 @@ def test_later_goals_at_steps_that_depend_on_the_seed_keep_runs_grouped(tmp_path
     up_to_a_return = run_spec(CONFIG, target_return=5.0)
     for config, later in ((of_episodes, {"episodes": 60}), (up_to_a_return, {"steps": 600})):
         runs = [
-            Run(tmp_path / str(step), run_spec(config, seed=step), [Goal(at_step=step, **later)])
-            for step in (271, 300)
+            Run(tmp_path / str(seed), run_spec(config, seed=seed), [Goal(at_step=end, **later)])
+            for seed, end in ((1, 271), (2, 300))
         ]
         assert len(groups_of(runs)) == 1
 

@@ -227,6 +227,7 @@ class SelectiveDesensitization {
     return result;
   }
 
+  /// Returns the largest number of +1 in a pattern: the columns that it can leave undesensitized.
   static std::size_t largest_count(const PatternTable& table) noexcept {
     std::size_t most = 0;
     for (std::size_t bin = 0; bin < table.n_bins(); ++bin) {

@@ -52,7 +52,8 @@ class OnlineLayer {
   const ParallelPerceptron& layer() const noexcept { return *layer_; }
   ParallelPerceptron& layer() noexcept { return *layer_; }
 
-  /// Presents samples in their order. Shapes: bins (n_samples, n_inputs).
+  /// Presents samples in their order; `rule` chooses the corrections of each. Returns how many
+  /// samples and units were corrected. Shapes: bins (n_samples, n_inputs).
   ///
   /// Throws std::invalid_argument for bins out of range or if the rule is for another number of
   /// samples or units, std::overflow_error if a weight would leave its range. An error or an
@@ -84,7 +85,7 @@ class OnlineLayer {
       correct(sample);
       count.n_samples += corrections_.empty() ? 0 : 1;
       count.n_units += corrections_.size();
-      core::interruption_point(true);
+      core::interruption_point(/*at_once=*/true);
     }
     undoing.is_done = true;
     changed_ = changed_ || count.n_units > 0;
@@ -165,7 +166,7 @@ class OnlineLayer {
   std::vector<std::int32_t> potentials_;
   std::vector<Correction> corrections_;
   std::vector<Applied> applied_;  // corrections of the current call
-  bool changed_ = false;          // since the last synchronization
+  bool changed_ = false;          // whether weights differ from the layer's, since synchronize
 };
 
 }  // namespace sdnn::estimators

@@ -35,7 +35,7 @@ class CorrectionLog {
   struct Entry {
     std::span<const coding::Bin> bins;
     std::span<const std::uint32_t> units;
-    std::int32_t step;
+    std::int32_t step;  ///< by which the weights of the units changed, times the code
   };
 
   /// The log of a layer that is never corrected.
@@ -66,6 +66,7 @@ class CorrectionLog {
             std::span(units_).subspan(slot * max_units_, sizes_[slot].n_units), sizes_[slot].step};
   }
 
+  /// Records a correction in place of the oldest one.
   void add(const Entry& entry) noexcept {
     assert(entry.units.size() <= max_units_);
     const std::size_t slot = size_ % kSize;

@@ -21,10 +21,10 @@ namespace sdnn::approximators {
 /// After n corrections the weights after correction t have a weight of about (t / n)^7: the average
 /// forgets early weights and smooths late oscillations. A unit then has the sign of the mean of its
 /// recent potentials. A snapshot is taken every `interval` corrections, later every n / 64. It
-/// moves the average by 2^-k of the way to the weights, about 8 / n times the corrections since the
-/// last. All numbers are integers, so equal corrections give equal bits. Weights have two bytes, of
-/// which 14 bits are for fractions of a step of the lattice, or fewer if a weight needs more bits
-/// for whole steps.
+/// moves the average by 2^-k of the way to the weights, with the k for which that is about 8 / n
+/// times the corrections since the last. All numbers are integers, so equal corrections give equal
+/// bits. Weights have two bytes, of which 14 bits are for fractions of the learning step, by which
+/// weights change, or fewer if a weight needs more bits for whole steps.
 ///
 /// Source: Polyak, B., Juditsky, A. (1992). Acceleration of stochastic approximation by averaging;
 /// Shamir, O., Zhang, T. (2013). Stochastic gradient descent for non-smooth optimization, section

@@ -1,4 +1,5 @@
-/// The codes of several samples as words or signs, and their inner products.
+/// The codes of several samples, as words of bits or as bytes +1, 0 and -1, and the inner products
+/// of two codes.
 #pragma once
 
 #include <cassert>
@@ -15,8 +16,8 @@
 
 namespace sdnn::coding {
 
-/// The codes of several samples, padded with zeros to a multiple of 4 words for inner products and
-/// corrections.
+/// The codes of several samples, padded with zeros to a multiple of 4 words, the 256 bits of a
+/// vector register.
 class CodedSamples {
  public:
   /// Shapes: bins (n_samples, n_inputs), checked before.
