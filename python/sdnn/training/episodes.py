@@ -16,6 +16,7 @@ from sdnn.training.files import (
     ActionLog,
     SavedEpisode,
     Statistics,
+    copied,
     learning_wrappers,
     names_of,
     statistics_of,
@@ -26,7 +27,6 @@ from sdnn.training.interfaces import (
     Options,
     Seeds,
     UnusableStepError,
-    copied,
     warn_of_endless_episode,
 )
 

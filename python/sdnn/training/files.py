@@ -6,6 +6,7 @@ Wrappers such as Gymnasium's NormalizeObservation have statistics in an attribut
 
 from __future__ import annotations
 
+import copy
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -238,8 +239,19 @@ def read_agent(path: Path, *kinds: str) -> tuple[Any, Description, Arrays]:
         raise ValueError(f"{path} is damaged: {error}") from error
 
 
+_SCALARS = (np.generic, int, float)
+"""Immutable types of observations and actions, which need no copy."""
+
+
 MOST_RECENT = 1024
 """Number of actions that are kept in a list before they become an array."""
+
+
+def copied(value: Element) -> Element:
+    """Copy an observation or action that an environment or agent may change later."""
+    if type(value) is np.ndarray:
+        return value.copy()
+    return value if isinstance(value, _SCALARS) else copy.deepcopy(value)
 
 
 class ActionLog:

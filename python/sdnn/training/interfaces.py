@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import abc
-import copy
 import inspect
 import warnings
 from collections.abc import Callable, Mapping
@@ -27,19 +26,8 @@ _LARGEST_DISCOUNT = 0.998
 """Largest discount with which values are learned reliably where nothing terminates."""
 
 
-_SCALARS = (np.generic, int, float)
-"""Immutable types of observations and actions, which need no copy."""
-
-
 class UnusableStepError(ValueError):
     """A step or reset of an environment cannot be used; the message names it and the reason."""
-
-
-def copied(value: Element) -> Element:
-    """Copy an observation or action that an environment or agent may change later."""
-    if type(value) is np.ndarray:
-        return value.copy()
-    return value if isinstance(value, _SCALARS) else copy.deepcopy(value)
 
 
 class EnvironmentAdapter(abc.ABC):

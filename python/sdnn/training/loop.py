@@ -22,7 +22,7 @@ from sdnn.support.arguments import require
 from sdnn.support.interrupts import Interrupts
 from sdnn.training.episodes import Episodes, checked_outcome
 from sdnn.training.evaluation import evaluate
-from sdnn.training.files import EpisodeBlock, share_statistics, statistics_of
+from sdnn.training.files import EpisodeBlock, copied, share_statistics, statistics_of
 from sdnn.training.interfaces import (
     LONG,
     CoreParts,
@@ -30,7 +30,6 @@ from sdnn.training.interfaces import (
     ObservingLearner,
     Transition,
     UnusableStepError,
-    copied,
     warn_of_horizon,
 )
 
