@@ -181,8 +181,9 @@ def main():
         os.environ[SECONDS] = "0"
         few = plan[:500]
         _, (alone,) = measure(folder / "alone", few, ThreadExecutor(1), groups[:1])
+    n_rows = 1500 if options.rows is None else options.rows
     print(
-        f"{len(plan)} trials of {options.seconds:g} s and {options.rows or 1500} rows,"
+        f"{len(plan)} trials of {options.seconds:g} s and {n_rows} rows,"
         f" {n_processes * size} workers started in {started:.0f} s:"
         f" {rate:.0f} recorded a second; processor ms a trial: driver {driver:.2f}"
         f" (one thread, no cluster {alone:.2f}), scheduler {of_scheduler:.2f},"

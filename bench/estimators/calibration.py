@@ -179,6 +179,8 @@ def grouped(kind, folder):
 
 
 def mean(rows, what):
+    if not rows:
+        raise SystemExit("rows are missing: run this without --redraw, and problems.py and real.py")
     return float(np.mean([row[what] for row in rows]))
 
 
@@ -243,7 +245,7 @@ def probability_table(results, of_real):
 
 def main():
     arguments = options(__doc__, seeds=5).parse_args()
-    seeds = range(arguments.seeds)
+    seeds = range(min(arguments.seeds, real.N_FOLDS))  # of measured problems the folds
     pairs = [(problem, name) for problem in REGRESSION for name in INTERVALS]
     measure_missing(
         "intervals", measure_intervals, [(*pair, s) for s in seeds for pair in pairs], arguments

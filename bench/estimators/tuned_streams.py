@@ -15,6 +15,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+import numpy as np
 from measured import measure_missing, measured, options
 from page import show
 from river import ensemble, forest, neighbors, tree
@@ -116,7 +117,7 @@ def measure(stream, name, seed):
         follow(seeded(make, seed, settings), stream, xs[first], ys[first]) for settings in grid
     ]
     values = [row.get("r2", row.get("accuracy")) for row in scores]
-    best = grid[values.index(max(values))]
+    best = grid[np.argmax(np.nan_to_num(values, nan=-np.inf))]
     return {**follow(seeded(make, seed, best), stream, xs, ys), "chosen": best}
 
 

@@ -137,7 +137,7 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
     def n_learned(self) -> int:
         """Number of steps learned or imitated in all, also before a save; not those of excursions.
 
-        On-policy agents, `SDNNActorCritic` and `FuzzyQLearning`, learn none of their warm-up.
+        On-policy agents learn no warm-up. Others count refused rewards in it; SDNN-C always.
         """
         return self._controller.n_learned
 

@@ -87,9 +87,8 @@ def _allowed_on(
             # In units of the axis; the least divisor avoids 0 / 0 on an axis of one value.
             away = np.abs(axis - numbers[i][state]) / max(np.ptp(axis), 1e-300)
             if agent_input.has_symbols:
-                away = (
-                    away > 0.0
-                ) * 2.0  # symbols have no order: any other is farther than a range
+                # Symbols have no order: any other one is farther than a range is wide.
+                away = (away > 0.0) * 2.0
             distance += np.square(away).reshape(-1, *[1] * i)
         is_nearer = distance < least
         least[is_nearer], nearest[is_nearer] = distance[is_nearer], state

@@ -244,7 +244,7 @@ _SCALARS = (np.generic, int, float)
 
 
 MOST_RECENT = 1024
-"""Number of actions that are kept in a list before they become an array."""
+"""Rounds of steps after which the recent actions of all episodes become arrays."""
 
 
 def copied(value: Element) -> Element:

@@ -192,8 +192,9 @@ def warn_of_horizon(agent: Any) -> None:
     discount = getattr(getattr(agent, "learning", None), "discount", 0.0)
     if discount > _LARGEST_DISCOUNT:
         warnings.warn(
-            f"no episode has terminated in {LONG:,} steps: with a discount of {discount:g} values"
-            " become so large that differences between actions are hardly learned. Unless episodes"
+            f"no episode of this training has terminated in {LONG:,} steps: with a discount of"
+            f" {discount:g} values become so large that differences between actions are hardly"
+            " learned. Unless episodes"
             f" will terminate, take learning.discount=0.99, or at most {_LARGEST_DISCOUNT}",
             RuntimeWarning,
             stacklevel=3,

@@ -190,7 +190,7 @@ class TrainingLoop(abc.ABC):
     is_within_step = False
     """Whether an error left a step half done, which cannot be saved."""
     _n_until_long = 0
-    """Steps at which the training is a long one; 0 after a terminated episode or a load."""
+    """Steps at which the training is a long one; 0 after a terminated episode, or a load."""
 
     _episodes: Episodes
     _learner: _LearnerForAll
@@ -225,6 +225,10 @@ class TrainingLoop(abc.ABC):
                 self.is_within_step = False
                 if failure is not None:
                     raise failure
+                if self.n_steps == self._n_until_long:
+                    warn_of_horizon(self.agent)
+                if self._episodes.is_over(environment):
+                    self._warn_of_problems()
                 if time.monotonic() >= due:
                     yield
                     due = time.monotonic() + seconds
@@ -238,7 +242,8 @@ class TrainingLoop(abc.ABC):
         if getattr(self.agent, "n_environments", 1) != n_environments and not self.is_finished:
             self.agent.n_environments = n_environments
         self._listeners = self._find_listeners()
-        self._n_until_long = 0 if self.n_steps else LONG * n_environments
+        if self.n_steps == 0:
+            self._n_until_long = LONG * n_environments
         self._set_next_call()
 
     def _learn_until(self, due: float) -> int:
@@ -311,7 +316,6 @@ class TrainingLoop(abc.ABC):
             )
             self.n_episodes += 1
             self._episodes.present[environment] = None
-            self._warn_of_problems()
             if row["terminated"] or not self.limit_bootstraps:
                 self._n_until_long = 0
             if self.evaluate_every_episodes is not None and self._lacks_evaluation:
@@ -325,8 +329,6 @@ class TrainingLoop(abc.ABC):
         if rows:
             self._report(rows)
         if is_called:
-            if self.n_steps == self._n_until_long:
-                warn_of_horizon(self.agent)
             for interval, callback in self._listeners:
                 if self.n_steps % interval == 0:
                     callback.on_step(self)

@@ -67,7 +67,7 @@ def test_code_gives_missing_readings_a_separate_pattern(agent_class):
         assert np.array_equal(table[:-1], core_without.table(i)), "one pattern is added, the last"
         is_last = state(agent, LOST)[i] * len(table) > len(table) - 1
         assert is_last == (i != 1)  # input 1 is the only reading that is present
-    # Rewards of 1 without the readings, and of -1 with them, are told apart.
+    # Rewards of 1 without the readings, and of -1 with them, are distinguished.
     for _ in range(60):
         agent.learn(Transition(LOST, agent.act(LOST), 1.0, LOST, True))
         agent.learn(Transition(READ, agent.act(READ), -1.0, READ, True))

@@ -661,27 +661,30 @@ def test_an_endless_episode_takes_less_than_32_bytes_per_step_and_resumes_exactl
     assert states_equal(training.agent, again.agent)
 
 
+class Unterminated(Corridor):
+    """Episodes are cut off where the corridor's would terminate."""
+
+    def step(self, action):
+        observation, reward, terminated, truncated, info = super().step(action)
+        return observation, reward, False, truncated or terminated, info
+
+
 @pytest.mark.parametrize(
-    ("discount", "n_environments", "terminates", "limit_bootstraps", "warned_at"),
+    ("discount", "n_environments", "env_class", "limit_bootstraps", "warned_at"),
     [
-        (0.999, 1, False, True, 2_000),
-        (1.0, 2, False, True, 4_000),
-        (0.998, 1, False, True, None),
-        (0.999, 1, True, True, None),
-        (0.999, 1, False, False, None),
+        (0.999, 1, Unterminated, True, 2_000),
+        (1.0, 2, Unterminated, True, 4_000),
+        (0.998, 1, Unterminated, True, None),
+        (0.999, 1, Corridor, True, None),
+        (0.999, 1, Unterminated, False, None),
     ],
 )
 def test_a_discount_near_1_is_warned_of_once_where_nothing_terminates(
-    discount, n_environments, terminates, limit_bootstraps, warned_at, tmp_path
+    discount, n_environments, env_class, limit_bootstraps, warned_at, tmp_path
 ):
-    class Unterminated(Corridor):
-        def step(self, action):
-            observation, reward, terminated, truncated, info = super().step(action)
-            return observation, reward, terminated and terminates, truncated or terminated, info
-
-    env = Unterminated()
+    env = env_class()
     if n_environments > 1:
-        env = gym.vector.SyncVectorEnv([Unterminated] * n_environments)
+        env = gym.vector.SyncVectorEnv([env_class] * n_environments)
     agent = corridor_agent(learning=QLearningConfig(discount=discount))
     for n_steps in (1_999, 6_000):
         training = Training(agent, env, steps=n_steps, limit_bootstraps=limit_bootstraps)
@@ -697,6 +700,29 @@ def test_a_discount_near_1_is_warned_of_once_where_nothing_terminates(
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         Training.load(tmp_path / "t", env, steps=10_000).run()
+
+
+def test_a_training_continues_after_a_warning_that_is_an_error():
+    class Notes(Callback):
+        step_interval = 1_000
+        steps = ()
+
+        def on_step(self, training):
+            self.steps += (training.n_steps,)
+
+    agent, notes = corridor_agent(learning=QLearningConfig(discount=0.999)), Notes()
+    training = Training(agent, Unterminated(), steps=3_000, callbacks=[notes])
+    for _ in training.pieces(0.0):
+        break
+    assert 0 < training.n_steps < 2_000
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(RuntimeWarning, match=r"discount of 0\.999 values"):
+            training.run()
+        assert training.n_steps == 2_000
+        training.run()
+    assert training.n_steps == 3_000
+    assert notes.steps == (1_000, 2_000, 3_000)
 
 
 def test_evaluations_every_5_episodes_come_at_their_ends_and_resume_exactly(tmp_path):

@@ -132,8 +132,8 @@ def test_the_command_exports_the_agent_that_new_agent_makes(
     ],
 )
 def test_the_actions_option_accepts_counts_and_ranges(actions, space, export, tmp_path):
-    words = [word for action in actions for word in ("--actions", action)]
-    done = export("--new", *GIVEN, *words)
+    options = [part for action in actions for part in ("--actions", action)]
+    done = export("--new", *GIVEN, *options)
     assert done.exit_code == 0, done.output
     agent = new_agent(SPACE, space, angles=[1])
     assert (tmp_path / "agent.h").read_text() == c_header(agent, "agent", learning=True).text

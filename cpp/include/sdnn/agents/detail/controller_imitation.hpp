@@ -45,6 +45,7 @@ inline bool Controller::has_acted(std::size_t environment) const {
       *agent_);
 }
 
+/// Refused rewards count in a warm-up, and where an agent does not count itself.
 inline std::uint64_t Controller::n_learned() const {
   if (warm_up_) return is_on_policy(config_.learning) ? 0 : warm_up_->size();
   const auto of_agent = [this](const auto& agent) {
