@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "sdnn/agents/detail/least_squares.hpp"
+#include "sdnn/agents/detail/steady_gains.hpp"
 #include "sdnn/agents/relevance.hpp"
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/interruption.hpp"
@@ -152,10 +153,9 @@ class Observer {
 
   /// Candidates from exact to very noisy sensors, each about 0.7 times the one before.
   static constexpr double kGains[] = {1.0, 0.7, 0.5, 0.35, 0.25, 0.175, 0.125, 0.09};
-  static constexpr double kDrifts[] = {3.0, 1.0, 0.3, 0.1, 0.03};
-  static constexpr double kLargestGain = 100.0;
-  static constexpr int kRounds = 3;  // fits, each to the last one's estimates
-  static constexpr int kRefinements = 4;
+  static constexpr double kDrifts[] = {3.0, 1.0, 0.3, 0.1, 0.03};  // in variances of the noise
+  static constexpr int kRounds = 3;       // fits, each to the last one's estimates
+  static constexpr int kRefinements = 4;  // gains of a model, then a model by their estimates
   static constexpr std::size_t kMostTransitions = 20'000;       // limits the time of a fit
   static constexpr std::size_t kMostLevels = 8;                 // more actions count as a number
   static constexpr std::size_t kMostFeaturesWithProducts = 17;  // 17 * 18 / 2 = 153 products

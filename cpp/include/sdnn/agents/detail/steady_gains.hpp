@@ -9,6 +9,9 @@
 
 namespace sdnn::agents::detail {
 
+/// Gains are clipped, since those of an unstable model grow without limit.
+inline constexpr double kLargestGain = 100.0;
+
 /// Returns the gains of the steady Kalman filter, shape (n, n): how far each estimate moves by each
 /// error of a prediction. `transition` (n, n) is the linear model of the next state, and sensors
 /// have independent noise of variances `noise` (n,), above 0. The model's own variances are a part
@@ -18,8 +21,7 @@ namespace sdnn::agents::detail {
 /// that no matrix is inverted.
 inline std::vector<double> steady_gains(const std::vector<double>& transition,
                                         const std::vector<double>& noise, double drift) {
-  constexpr int kSteps = 100;
-  constexpr double kLargest = 100.0;
+  constexpr int kSteps = 100;  // in which gains of a stable model settle
   const std::size_t n = noise.size();
   std::vector<double> covariance(n * n), product(n * n), column(n);
   for (std::size_t i = 0; i < n; ++i) covariance[i * n + i] = noise[i];
@@ -49,7 +51,7 @@ inline std::vector<double> steady_gains(const std::vector<double>& transition,
     }
   }
   for (std::size_t k = 0; k < n * n; ++k) {
-    covariance[k] = std::clamp(covariance[k] / noise[k % n], -kLargest, kLargest);
+    covariance[k] = std::clamp(covariance[k] / noise[k % n], -kLargestGain, kLargestGain);
   }
   return covariance;
 }
