@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -13,6 +14,10 @@ from sdnn.estimators.training import FEWEST_SAMPLES, Rows, held_out_fifth, sampl
 
 if TYPE_CHECKING:
     from sdnn.estimators.base import BaseSDNN
+
+
+class CalibrationError(ValueError):
+    """Samples of which no fifth can be held out to calibrate."""
 
 
 class HeldOut(NamedTuple):
@@ -34,12 +39,12 @@ def learn_without_fifth(
 ) -> HeldOut:
     """Train a model like a fitted one without a fifth of the samples.
 
-    It has the same codings and pairs. A class of a single sample is not held out. ValueError for
-    fewer than ten samples.
+    It has the same codings and pairs. A class of a single sample is not held out. CalibrationError
+    for fewer than ten samples, or if each class has a single sample.
     """
     targets = np.asarray(y)
     if len(targets) < FEWEST_SAMPLES:
-        raise ValueError(
+        raise CalibrationError(
             f"calibrate must be False with fewer than {FEWEST_SAMPLES} samples, got {len(targets)}"
         )
     seed = fitted._weight_seed
@@ -48,7 +53,7 @@ def learn_without_fifth(
         labels, counts = np.unique(targets, return_counts=True)
         is_held &= ~np.isin(targets, labels[counts == 1])
         if not is_held.any():
-            raise ValueError("calibrate must be False where hardly a class has two samples")
+            raise CalibrationError("calibrate must be False where hardly a class has two samples")
     weights = np.ones(len(targets)) if sample_weight is None else np.asarray(sample_weight)
     model = clone(fitted).set_params(
         calibrate=False,
@@ -63,6 +68,8 @@ def learn_without_fifth(
         model._largest_full_sample = 0
     learned, held = np.flatnonzero(~is_held), np.flatnonzero(is_held)
     learned_weights = None if sample_weight is None else weights[learned]
-    model.fit(samples_in(X, learned), targets[learned], learned_weights)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the fit to all samples has warned already
+        model.fit(samples_in(X, learned), targets[learned], learned_weights)
     weights_of_held = weights[held].astype(np.float64)
     return HeldOut(model, held, samples_in(X, held), targets[held], weights_of_held)

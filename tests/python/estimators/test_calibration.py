@@ -10,6 +10,7 @@ from sklearn.datasets import load_iris
 from refusals import refuses
 from sdnn import SDNNClassifier, SDNNRegressor
 from sdnn.coding import Symbolic
+from sdnn.estimators import classifier
 from sdnn.estimators.calibration import held_out_fifth
 from sdnn.estimators.classifier import STEEPNESS
 from sdnn.estimators.fitted import STEEPNESSES
@@ -42,7 +43,7 @@ def test_a_fifth_of_each_class_is_held_out():
 
 def test_the_steepness_has_the_smallest_log_loss_on_the_held_out_fifth():
     points, labels = load_iris(return_X_y=True)
-    plain = SDNNClassifier(**OPTIONS).fit(points, labels)
+    plain = SDNNClassifier(**OPTIONS, calibrate=False).fit(points, labels)
     model = SDNNClassifier(**OPTIONS, calibrate=True).fit(points, labels)
     np.testing.assert_array_equal(model.weights_, plain.weights_)
     is_held = held_out_fifth(labels, True, model._weight_seed)
@@ -67,7 +68,7 @@ def test_the_steepness_has_the_smallest_log_loss_on_the_held_out_fifth():
 
 def test_probabilities_of_a_calibrated_model_have_its_steepness_also_when_loaded(tmp_path):
     points, labels = load_iris(return_X_y=True)
-    plain = SDNNClassifier(**OPTIONS).fit(points, labels)
+    plain = SDNNClassifier(**OPTIONS, calibrate=False).fit(points, labels)
     model = SDNNClassifier(**OPTIONS, calibrate=True).fit(points, labels)
     raised = plain.predict_proba(points) ** (model.steepness_ / STEEPNESS)
     expected = raised / raised.sum(axis=1, keepdims=True)
@@ -84,12 +85,30 @@ def test_probabilities_of_a_calibrated_model_have_its_steepness_also_when_loaded
 def test_calibration_lowers_the_loss_where_classes_overlap():
     X, y = overlapping()
     model = SDNNClassifier(**OPTIONS, calibrate=True).fit(X[:400], y[:400])
-    plain = SDNNClassifier(**OPTIONS).fit(X[:400], y[:400])
+    plain = SDNNClassifier(**OPTIONS, calibrate=False).fit(X[:400], y[:400])
     assert (
         losses_of(model, X[400:], y[400:]).mean() < losses_of(plain, X[400:], y[400:]).mean() - 0.02
     )
     model.set_params(calibrate=False).fit(X[:400], y[:400])
     assert not hasattr(model, "steepness_")
+
+
+def test_a_classifier_is_calibrated_by_default_where_a_fifth_can_be_held_out(monkeypatch):
+    X, y = overlapping(60)
+    default, calibrated = (
+        SDNNClassifier(**OPTIONS, calibrate=calibrate).fit(X, y) for calibrate in (None, True)
+    )
+    assert default.steepness_ == calibrated.steepness_
+    not_calibrated = [
+        SDNNClassifier(**OPTIONS).fit(X[:9], y[:9]),
+        SDNNClassifier(**OPTIONS).fit(X[:12], np.arange(12)),  # classes of a single sample
+        SDNNClassifier(**OPTIONS, n_units_per_class=1).fit(X, y),
+        SDNNClassifier(**OPTIONS, warm_start=True).fit(X, y),
+        SDNNClassifier(**OPTIONS).partial_fit(X, y, classes=[0, 1]),
+    ]
+    monkeypatch.setattr(classifier, "MOST_CALIBRATED", 59)
+    not_calibrated.append(SDNNClassifier(**OPTIONS).fit(X, y))
+    assert not any(hasattr(model, "steepness_") for model in not_calibrated)
 
 
 def test_calibration_uses_sample_weights_and_ignores_samples_of_weight_0():
