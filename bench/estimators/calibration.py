@@ -2,8 +2,8 @@
 
     OMP_NUM_THREADS=1 python bench/estimators/calibration.py [--seeds 5] [--only WORD] [--redraw]
 
-Measures what the store lacks, and writes tables of problems.md and streams.md in docs/evidence;
---full prints every problem. Needs what problems.py, real.py and streams.py need.
+Measures what the store lacks, and writes tables of problems.md and streams.md in docs/evidence, and
+a figure; --full prints every problem. Needs what problems.py, real.py and streams.py need.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ import real_data
 import stream_data
 from baselines import WithClasses
 from catboost import CatBoostClassifier
+from figures import interval_figure
 from measured import measure_missing, measured, options
 from page import markdown, show
 from real import calibration_error, make_model
@@ -33,6 +34,8 @@ from sklearn.model_selection import KFold, StratifiedKFold
 from streams import N_FIRST, ours
 
 from sdnn import SDNNClassifier, SDNNKernelClassifier, SDNNKernelRidge, SDNNRegressor
+from sdnn.reports.plots import png_bytes
+from sdnn.support.files import write_whole
 
 COVERAGE = 0.9
 N_PARTS = 8
@@ -69,7 +72,7 @@ class QuantileBoosting:
 INTERVALS = {
     "SDNN kernel ridge": (lambda seed, n_inputs: SDNNKernelRidge(), {}),
     "SDNN kernel ridge, scaled": (lambda seed, n_inputs: SDNNKernelRidge(), {"scaled": True}),
-    "SDNN, calibrate": (
+    "SDNN, calibrate=True": (
         lambda seed, n_inputs: SDNNRegressor(calibrate=True, random_state=seed),
         {},
     ),
@@ -81,10 +84,13 @@ STREAMS = {
     name: N_STREAM_SEEDS if name in stream_data.SYNTHETIC else 1 for name in stream_data.REGRESSION
 }
 """Seeds of each stream."""
-CALIBRATED = "SDNN, calibrate"
+OURS = {
+    "SDNN, calibrate=False": lambda seed: SDNNClassifier(calibrate=False, random_state=seed),
+    "SDNN, calibrate=True": lambda seed: SDNNClassifier(calibrate=True, random_state=seed),
+}
+"""The default calibrates up to 10,000 samples."""
 PROBABILITIES = {
-    "SDNN": lambda seed: SDNNClassifier(random_state=seed),
-    CALIBRATED: lambda seed: SDNNClassifier(calibrate=True, random_state=seed),
+    **OURS,
     "SDNN kernel ridge": lambda seed: SDNNKernelClassifier(random_state=seed),
     "gradient boosting": lambda seed: HistGradientBoostingClassifier(random_state=seed),
     "CatBoost": lambda seed: WithClasses(
@@ -227,7 +233,7 @@ def probability_table(results, of_real):
     rows = []
     for name in PROBABILITIES:
         made = [results[problem, name] for problem in problems.CLASSIFICATION]
-        source = results if name == CALIBRATED else of_real
+        source = results if name in OURS else of_real
         folds = [source[problem, name] for problem in MEASURED]
         texts = [
             f"{np.mean([mean(rows, what) for rows in group]):.3f}"
@@ -255,7 +261,8 @@ def main():
     asked = [
         *((problem, name, s) for s in seeds for problem in problems.CLASSIFICATION
           for name in PROBABILITIES),
-        *((problem, CALIBRATED, fold) for fold in range(real.N_FOLDS) for problem in MEASURED),
+        *((problem, name, fold) for fold in range(real.N_FOLDS) for problem in MEASURED
+          for name in OURS),
         *((LARGE, name, 0) for name in PROBABILITIES),
     ]  # fmt: skip
     measure_missing("probabilities", measure_probabilities, asked, arguments)
@@ -271,6 +278,7 @@ def main():
     }
     show(tables, folder / "problems.md")
     show({"intervals": stream_table(grouped("stream intervals", folder))}, folder / "streams.md")
+    write_whole(folder / "intervals.png", png_bytes(interval_figure(), dpi=140))
 
 
 if __name__ == "__main__":

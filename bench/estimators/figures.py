@@ -1,4 +1,4 @@
-"""The figures of docs/how-to/regression.md, which compare.py draws."""
+"""The figures of docs/how-to/regression.md, which compare.py and calibration.py draw."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from demonstration import BLANKS, N_TRAINING, errors, lattice, target, training_
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from sdnn import SDNNKernelRidge, SDNNRegressor
 from sdnn.coding import Anchor, Circular, RandomInverse, kernel
+from sdnn.estimators.river import RiverRegressor
 
 COLORS = {
     "SDNN (ours)": ("#1f5a96", "o"),
@@ -103,3 +105,61 @@ def useless_figure(rows):
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
+
+
+def noisy_waves(n_samples, seed):
+    """Sines, with noise whose standard deviation grows from 0.05 to 0.55."""
+    random = np.random.default_rng(seed)
+    x = random.uniform(0, 1, n_samples)
+    return x[:, None], np.sin(6 * x) + (0.05 + 0.5 * x) * random.normal(size=n_samples)
+
+
+def interval_figure():
+    """Intervals for 0.9 of the targets, of three models and of a stream whose noise changes."""
+    X, y = noisy_waves(400, seed=0)
+    X_new, y_new = noisy_waves(400, seed=1)
+    grid = np.linspace(0, 1, 400)[:, None]
+    figure = Figure(figsize=(10.5, 2.9), layout="constrained")
+    panels = (
+        ("SDNNKernelRidge", SDNNKernelRidge(), {}),
+        ("SDNNKernelRidge, scaled=True", SDNNKernelRidge(), {"scaled": True}),
+        ("SDNNRegressor(calibrate=True)", SDNNRegressor(calibrate=True, random_state=0), {}),
+    )
+    *first, last = figure.subplots(1, 4)
+    for axes, (title, model, options) in zip(first, panels, strict=True):
+        model.fit(X, y)
+        draw_interval(axes, grid[:, 0], model.predict_interval(grid, **options).T)
+        low, high = model.predict_interval(X_new, **options).T
+        axes.plot(X_new[:, 0], y_new, ".", color="black", markersize=2)
+        share = np.mean((low <= y_new) & (y_new <= high))
+        axes.set_title(title, fontsize=9)
+        axes.set(xlabel=f"input; {share:.2f} of new targets inside", ylim=(-3, 3))
+    draw_stream(last)
+    figure.axes[0].set_ylabel("target")
+    return figure
+
+
+def draw_interval(axes, x, bounds):
+    axes.fill_between(x, *bounds, color="#9fc0e0", linewidth=0)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def draw_stream(axes):
+    """Draw intervals of a stream whose noise is four times as strong after 1,500 samples."""
+    random = np.random.default_rng(0)
+    model, bounds, targets = RiverRegressor(), [], []
+    for t in range(3000):
+        x = {"a": random.uniform(), "b": random.uniform()}
+        y = x["a"] + random.normal(scale=0.1 if t < 1500 else 0.4)
+        interval = model.predict_one(x, with_interval=True)
+        bounds.append((interval.lower - x["a"], interval.upper - x["a"]))
+        targets.append(y - x["a"])
+        model.learn_one(x, y)
+    t = np.arange(100, 3000)
+    low, high = np.array(bounds)[t].T
+    draw_interval(axes, t, (low, high))
+    axes.plot(t, np.array(targets)[t], ".", color="black", markersize=1)
+    share = np.mean((low <= np.array(targets)[t]) & (np.array(targets)[t] <= high))
+    axes.set_title("RiverRegressor, noise changes", fontsize=9)
+    axes.set(xlabel=f"sample; {share:.2f} of targets inside", ylabel="target minus its mean",
+             ylim=(-1.5, 1.5))  # fmt: skip
