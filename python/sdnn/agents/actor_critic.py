@@ -87,6 +87,7 @@ warm_up_steps, missing, history
 
     @epsilon.setter
     def epsilon(self, epsilon: float | None) -> None:
+        """Refuse every exploration rate but 0: the policy itself explores."""
         if epsilon:
             raise ValueError(
                 f"epsilon must be 0, got {epsilon}: the policy itself is random; set"

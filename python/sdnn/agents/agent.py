@@ -213,11 +213,11 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
         return self._require_warm().values(variables, dimension)
 
     def _facts(self) -> dict[str, object]:
-        inputs = "found in the warm-up" if self.is_warming_up else len(self.inputs)
+        """Return the facts that ``repr`` and notebooks display, by their labels."""
         facts: dict[str, object] = {
             "observation": space_words(self.observation_space),
             "action": space_words(self.action_space),
-            "inputs": inputs,
+            "inputs": "found in the warm-up" if self.is_warming_up else len(self.inputs),
             "seed": self.seed,
         }
         if self.n_learned:

@@ -170,20 +170,20 @@ class BaseAgent(Advised, abc.ABC, Generic[Approximator, Learning]):
         return self._actions.space
 
     def _take_settings(self, approximator: Any, learning: Any, seed: Any, steps: Any) -> None:
-        for name, part in (("approximator", approximator), ("learning", learning)):
-            kind: type[Any] = getattr(self, f"{name}_type")
-            require(is_of_class(part, kind), name, f"be a {kind.__name__}", part, TypeError)
+        """Check and store the arguments of the constructor that are no spaces."""
+        for name, config in (("approximator", approximator), ("learning", learning)):
+            cls: type[Any] = getattr(self, f"{name}_type")
+            require(is_of_class(config, cls), name, f"be a {cls.__name__}", config, TypeError)
         self._approximator, self.learning = approximator, learning
         self.seed = secrets.randbits(63) if seed is None else seed_of(seed)
         self._warm_up_steps = whole("warm_up_steps", steps, int(WARM_UP.low), int(WARM_UP.high))
 
     def _make_controller(self, **made_of: Any) -> None:
-        approximator: Any = self._approximator
-        learning: Any = self.learning
+        """Make the compiled agent, from pattern tables or from a saved state (`made_of`)."""
         try:
             self._controller = _core.Controller(
-                approximator=approximator,
-                learning=learning,
+                approximator=cast(Any, self._approximator),
+                learning=cast(Any, self.learning),
                 seed=self.seed,
                 observation=self._observation,
                 action=self._action,

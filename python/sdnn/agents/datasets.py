@@ -307,6 +307,7 @@ def _is_of_mappings(column: Any) -> bool:
 
 
 def _n_rows_of(column: Any) -> int:
+    """Return the number of rows of a column; a nested column has those of its shortest part."""
     if isinstance(column, Mapping | tuple):
         parts = column.values() if isinstance(column, Mapping) else column
         return min((_n_rows_of(part) for part in parts), default=0)

@@ -332,6 +332,7 @@ def meet_states(agent: AnyAgent, env: Env, seed: int = 0, options: Data | None =
     env.action_space.seed(seed)
 
     def random_action(mask: Any) -> Element | None:
+        """Return a random action that `mask` allows in a share of the steps, else None."""
         if generator.random() >= SHARE_RANDOM:
             return None
         if isinstance(mask, tuple | list):
@@ -409,6 +410,7 @@ def influences(
 
 
 def _action_change(agent: AnyAgent, before: Floats, after: Floats) -> float:
+    """Return how much actions change: a share of states, or of the range of continuous ones."""
     space = agent.action_space
     if not isinstance(space, gym.spaces.Box):
         return float((before != after).any(axis=1).mean())

@@ -167,6 +167,7 @@ def axis_label(agent_input: AgentInput) -> str:
 
 
 def _colorbar(axes: Axes, mesh: object) -> None:
+    """Add a color bar beside the panel of `mesh`, in the style of all figures."""
     figure = axes.figure
     assert figure is not None
     bar = figure.colorbar(mesh, ax=axes, pad=0.02)  # type: ignore[arg-type]

@@ -206,6 +206,7 @@ def measure_threads(n_inputs: int, noise: float, effort: Effort) -> dict[str, ob
         return time.thread_time() - begin
 
     def seconds(n_threads: int) -> tuple[float, float]:
+        """Return the wall time of one trial per thread, and the mean processor time of a trial."""
         trials = [_short_trial(n_inputs, noise, effort.n_episodes) for _ in range(n_threads)]
         with thread_pool(n_threads) as pool:
             begin = time.perf_counter()
@@ -244,6 +245,7 @@ def at_level(level: str, run: Run) -> Run:
     """Return a run that is measured with another instruction set."""
 
     def _run(n: int) -> Nanoseconds:
+        """Call `run` under the instruction set `level`, then restore the previous one."""
         before = instruction_set()
         set_instruction_set(level)
         try:

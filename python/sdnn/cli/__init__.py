@@ -30,6 +30,7 @@ def _check_instruction_set() -> None:
 
 
 def _print_version(context: click.Context, _parameter: click.Parameter, value: bool) -> None:
+    """Print the version and the build, then exit: the callback of ``--version``."""
     if value:
         from sdnn.support.machine import build
 
@@ -40,6 +41,7 @@ def _print_version(context: click.Context, _parameter: click.Parameter, value: b
 
 
 def _print_cmake_dir(context: click.Context, _parameter: click.Parameter, value: bool) -> None:
+    """Print where the CMake package is, then exit: the callback of ``--cmake-dir``."""
     if not value:
         return
     import sdnn

@@ -180,6 +180,7 @@ def run_command(
 
 
 def _how_to_resume(folder: Path | None) -> str:
+    """Return the end of a message that names the command to resume with, if there is a run."""
     from sdnn.runs.run import resume_command
 
     if folder is None or not folder.exists():

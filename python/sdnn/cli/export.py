@@ -287,6 +287,7 @@ def _new_agent(
     seed: int | None,
     missing: Missing | None,
 ) -> AnyAgent:
+    """Make an untrained agent from the options of ``sdnn export`` without a file."""
     import gymnasium as gym
     import numpy as np
 

@@ -81,6 +81,7 @@ def study_command(make_study: Callable[..., Study]) -> Function:
         *, where: str, jobs: int | None, scheduler: str | None, scheduler_timeout: float | None,
         out: Path, as_json: bool, full: bool, dry_run: bool, **options: object,
     ) -> None:  # fmt: skip
+        """Run the study that the options describe, print its results, and exit with a status."""
         from rich.console import Console
 
         from sdnn.reports.pages import duration_words

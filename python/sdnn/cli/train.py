@@ -176,6 +176,7 @@ def _options_by_key(env_id: str | None, options: Options) -> Options:
     by_option = {key: (option_of(key), value) for key, value in values.items()}
 
     def give(option: str, key: str, value: object) -> None:
+        """Set `key` to the value of an option; refuse a key that another option has set."""
         other, before = by_option.setdefault(key, (option, value))
         if other != option:
             raise click.UsageError(

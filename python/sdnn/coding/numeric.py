@@ -98,6 +98,7 @@ class Ranged(Coding):
         return self.ends() if self.knots is None else None
 
     def bins(self, column: Column) -> NDArray[np.int32]:
+        """Return the bin of each value: equal parts of the range, or between quantiles (knots)."""
         values, (low, high) = numbers(column), self.ends()
         if not low / 2 < high / 2:  # a column with a single value, or values next to 0
             positions = np.zeros(len(values))
@@ -151,6 +152,7 @@ class RandomInverse(Ranged):
     knots: Knots | None = None
 
     def fit(self, column: Column, n_units: int) -> RandomInverse:
+        """Return a copy with the range, bins and knots that the column and `n_units` determine."""
         one_of("spacing", self.spacing, ("even", "quantile"))
         is_learned = self.knots is not None and not self.learns
         has_range = not (self.low is None and self.high is None)
@@ -207,6 +209,7 @@ class RandomInverse(Ranged):
         return _core.random_inverse_patterns(n_units, self.size, fitted_field(self.n_flipped), seed)
 
     def correlations(self, n_units: int) -> NDArray[np.float64]:
+        """Return how patterns of two bins correlate: a power of the distance of the bins."""
         of_distances = np.power(
             1 - 4 * fitted_field(self.n_flipped) / n_units, np.arange(self.size)
         )
@@ -237,6 +240,7 @@ class Anchored(Coding):
         )
 
     def correlations(self, n_units: int) -> NDArray[np.float64]:
+        """Return how patterns of two bins correlate, by the anchors between which they lie."""
         # Between the same two anchors the correlation falls linearly with the distance. Patterns on
         # two sides of an anchor correlate by the product of their shares of that anchor.
         n_stretches, n_portions = self.n_anchor_patterns - 1, self.n_interpolated + 1
@@ -301,6 +305,7 @@ class Circular(Anchored):
     learns: ClassVar[bool] = False
 
     def fit(self, column: Column, n_units: int) -> Circular:
+        """Check the parameters; nothing is learned from the column."""
         self._check_anchors()
         numbers(column)
         is_period = 0 < real("period", self.period) < math.inf
@@ -309,6 +314,7 @@ class Circular(Anchored):
         return self
 
     def bins(self, column: Column) -> NDArray[np.int32]:
+        """Return the bin of each value: equal parts of a turn of the circle."""
         values = numbers(column)
         if np.isinf(values).any():
             raise ValueError("Input contains infinity, which has no place on a circle")

@@ -42,6 +42,7 @@ class Categorical(Coding):
     categories: tuple[Category, ...] | None
 
     def __post_init__(self) -> None:
+        """Check the categories, and convert them to a tuple."""
         categories: object = self.categories
         if categories is None:
             return
@@ -62,6 +63,7 @@ class Categorical(Coding):
         return len(fitted_field(self.categories))
 
     def bins(self, column: Column) -> NDArray[np.int32]:
+        """Return the number of each value's category; ValueError lists unknown values."""
         numbers = {
             category: number for number, category in enumerate(fitted_field(self.categories))
         }
@@ -77,6 +79,7 @@ class Categorical(Coding):
         categories = set(fitted_field(self.categories))
 
         def is_known(value: object) -> bool:
+            """Return whether `value` is a learned category; values without a hash never are."""
             try:
                 return value in categories
             except TypeError:
@@ -112,6 +115,7 @@ class Symbolic(Categorical):
     categories: tuple[Category, ...] | None = None
 
     def fit(self, column: Column, n_units: int) -> Symbolic:
+        """Return a copy with the categories of the column, unless they were given."""
         categories = self.categories
         are_different = categories is None or 0 < len(set(categories)) == len(categories)
         require(are_different, "categories", "be different and at least one", categories)
@@ -156,6 +160,7 @@ class CorrelationMatrix(Categorical):
         object.__setattr__(self, "matrix", tuple(map(tuple, rows.tolist())))
 
     def fit(self, column: Column, n_units: int) -> CorrelationMatrix:
+        """Check the matrix; return a copy with the categories of its rows."""
         matrix = np.array(self.matrix)
         is_square = matrix.ndim == 2 and matrix.shape[0] == matrix.shape[1]
         is_symmetric = is_square and np.array_equal(matrix, matrix.T)
@@ -202,6 +207,7 @@ class WithMissing(Coding):
     unknown: Literal["missing", "error"] = "missing"
 
     def fit(self, column: Column, n_units: int) -> WithMissing:
+        """Return a copy whose base coding has learned the values that are present."""
         one_of("unknown", self.unknown, ("missing", "error"))
         learns = self.learns  # raises first if the base is not a coding
         values = self._values(column[self._is_present(column)])
@@ -223,6 +229,7 @@ class WithMissing(Coding):
         return self.base.ends()
 
     def bins(self, column: Column) -> NDArray[np.int32]:
+        """Return the bins of the base coding; missing values have an additional, last bin."""
         is_present = self._is_present(column)
         if isinstance(self.base, Categorical) and self.unknown == "missing":
             is_present &= self.base.knows(column)
@@ -231,6 +238,7 @@ class WithMissing(Coding):
         return bins
 
     def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
+        """Return the patterns of the base coding, then that of missing values."""
         sequence = np.random.SeedSequence(seed_of(seed))
         seed_of_missing = int(sequence.generate_state(1, np.uint64)[0])
         missing = _core.symbol_patterns(1, n_units, seed_of_missing)

@@ -187,6 +187,7 @@ class AcrobotSwingUpEnv(gym.Env[Array, ArrayLike]):
         self._pictures += [picture for picture in pictures if picture is not None]
 
     def _draw(self, state: NDArray[np.float64], solved: bool) -> NDArray[np.uint8] | None:
+        """Draw the acrobot in the window, or return its picture."""
         if self._picture is None:
             fps = self.metadata["render_fps"] if self.render_mode == "human" else None
             self._picture = AcrobotPicture(self.config, fps)
@@ -202,6 +203,7 @@ class AcrobotSwingUpEnv(gym.Env[Array, ArrayLike]):
         return _core.basic_observation(self._acrobot.state()).astype(self._dtype)
 
     def _info(self) -> Data:
+        """Return the ``info`` of a step or reset."""
         return {
             "state": self._acrobot.state(),
             "tip_height": self._acrobot.tip_height(),

@@ -149,6 +149,7 @@ class AcrobotPicture:
         self._canvas.blit(drawn, (left, y * _FINE))
 
     def _draw_background(self, solved: bool) -> None:
+        """Draw the reach of the links, the dashed line of the goal and its label."""
         draw = self._pygame.draw
         draw.circle(self._canvas, _FAINT, self._pixel(0j), self._reach * self._scale, _FINE)
         y = self._pixel(self._config.goal_height * 1j)[1]

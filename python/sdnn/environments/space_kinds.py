@@ -81,6 +81,7 @@ def _n_variables(space: Space) -> int:
 
 
 def _problem_of_space(space: Space) -> str:
+    """Return the error message for a space that cannot be flattened to numbers."""
     return (
         "observation_space must be a space that Gymnasium flattens to a vector,"
         f" got {type(space).__name__}"

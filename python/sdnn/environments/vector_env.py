@@ -170,6 +170,7 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[Array, ArrayLike, Array]):
         self._picture = None
 
     def _reset_mask(self, mask: ArrayLike | None) -> NDArray[np.bool_]:
+        """Return which environments to reset: all of them unless the option selects some."""
         name = "options['reset_mask']"
         chosen = np.ones(self.num_envs, np.bool_) if mask is None else array_of(name, mask, "b")
         expected = f"be a bool array of shape ({self.num_envs},) with at least one True"

@@ -380,6 +380,7 @@ class BaseSDNN(Fitted, CodedInputs):
     def _trainer(
         self, bins: Ints, targets: Array, n_epochs: int, part_of_share: float = 1.0
     ) -> Trainer:
+        """Make the compiled trainer of the learning rule: p-delta, or perceptrons."""
         rule = self._rule_arguments(targets)
         options: dict[str, Any] = {
             "form": self.training,

@@ -83,6 +83,7 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
     calibrate: bool | None = parameter(None, "boolean", None)
 
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
+        """Train, and with `calibrate` fit the steepness of probabilities to held-out samples."""
         may_be = not self.calibrate or self._has_several_units()
         expected = "be False with a single unit per class, which has no probabilities"
         require(may_be, "calibrate", expected, self.calibrate)
@@ -121,6 +122,7 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
         share = 0.5 / (0.5 + float(weights.sum()))
 
         def loss(log_steepness: float) -> float:
+            """Return the cross entropy of the smoothed targets, for a search over the steepness."""
             logarithms = log_softmax(np.exp(log_steepness) * scores, axis=1)
             of_targets = logarithms[np.arange(len(targets)), targets]
             return weighted_mean(
@@ -189,6 +191,7 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
             raise ValueError("classes must be given in the first call of partial_fit or learn_one")
 
     def _set_outputs(self, y: ArrayLike) -> int:
+        """Note the classes and the number of units of each; return the number of units."""
         self._set_classes(y)
         n_classes = len(self.classes_)
         may_be_several, n_units_each = self.scheme == "one_vs_rest", self.n_units_per_class
@@ -240,6 +243,7 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
         return order[np.searchsorted(self.classes_, y, sorter=order)].astype(np.int32)
 
     def _rule_arguments(self, targets: Ints) -> Rule:
+        """Return what the learning rule needs: labels, or how many units should fire."""
         n_classes = len(self.classes_)
         if self._n_units_each == 1:
             return targets, n_classes, self._scheme
@@ -248,6 +252,7 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
         return counts, self.correction_share
 
     def _presentations(self, targets: Ints, weights: Floats | None) -> Floats | None:
+        """Return the weight of each sample, times that of its class; None if all are equal."""
         each = class_weights(self.class_weight, self.classes_[targets])
         if each is None or weights is None:
             return weights if each is None else each
@@ -262,6 +267,7 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
         return mean_of(self._counts(bins, len(self.classes_), n_threads)) / self._n_units_each
 
     def _probabilities(self, bins: Ints, n_threads: int) -> Floats:
+        """Return the softmax of the scores, with a fixed or calibrated steepness."""
         scores = self._scores(bins, n_threads)
         steepness = getattr(self, "steepness_", STEEPNESS)  # absent without a calibration
         raised = np.exp(steepness * (scores - scores.max(axis=1, keepdims=True)))
@@ -269,6 +275,7 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
         return probabilities
 
     def _decision(self, bins: Ints, n_threads: int) -> Floats:
+        """Return the values of ``decision_function``: one column for two classes."""
         n_classes = len(self.classes_)
         if self._n_units_each > 1:
             scores = self._scores(bins, n_threads)

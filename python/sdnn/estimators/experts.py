@@ -157,6 +157,7 @@ class Experts(abc.ABC):
         return [self.mean, *self.linear, *([] if self.window is None else [self.window])]
 
     def _learn(self, row: Floats, target: Floats) -> None:
+        """Learn a scaled sample in every expert but the network."""
         if self.window is not None:
             self.window.learn(row, finite_sum(target, -self.linear[0].predict(row)))
         self.mean.learn([], target)
@@ -205,6 +206,7 @@ class Experts(abc.ABC):
         return {**weights, "network": network}
 
     def __getstate__(self) -> dict[str, object]:
+        """Return the attributes for pickle, the compiled models as plain states."""
         states = [model.state() for model in [*self._models(), self.mixture]]
         left_out = ("mean", "linear", "window", "mixture")
         return {
@@ -213,6 +215,7 @@ class Experts(abc.ABC):
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
+        """Restore the attributes, and make the compiled models from their states."""
         states = state.pop("states")
         self.__dict__ = state
         self.mixture = self._mixture()

@@ -79,6 +79,7 @@ class CodedInputs(BaseEstimator):
 
     @property
     def _parameter_constraints(self) -> dict[str, list[object]]:
+        """Return scikit-learn's constraints, read from the metadata of the fields."""
         return {
             field.name: field.metadata["constraints"]
             for field in dataclasses.fields(self)

@@ -62,7 +62,7 @@ class KernelOfSamples(InputBins):
 
 
 def tables_of(codings: Sequence[Coding]) -> list[Floats] | None:
-    """Return the correlations of each input; None if they are too many."""
+    """Return the correlations of each input's bins; None if there are too many to look up fast."""
     tables, n_correlations = [], 0
     for coding in codings:
         tables.append(correlations_of(coding))

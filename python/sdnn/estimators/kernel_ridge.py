@@ -295,6 +295,7 @@ class SDNNKernelRidge(CodedRegressor, BaseKernelRidge):
     """
 
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
+        """Solve for the coefficients, then model the size of errors for intervals."""
         table, targets = self._check_samples(X, y)
         counts = self._sample_counts(sample_weight, len(table))
         self._flat = targets.ndim == 1
@@ -389,6 +390,7 @@ class SDNNKernelClassifier(CodedClassifier, BaseKernelRidge):
     """
 
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
+        """Solve for one-hot targets; fit the steepness to leave-one-out predictions."""
         table, labels = self._check_samples(X, y)
         counts = self._sample_counts(sample_weight, len(table))
         self._set_classes(labels)

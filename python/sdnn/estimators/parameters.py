@@ -40,6 +40,7 @@ def documents(base: type) -> Callable[[type[Estimator]], type[Estimator]]:
     """
 
     def decorate(estimator: type[Estimator]) -> type[Estimator]:
+        """Insert the base's sections into the docstring of `estimator`."""
         text, of_base = inspect.getdoc(estimator), inspect.getdoc(base)
         if text is None or of_base is None:  # python -OO removes docstrings
             return estimator

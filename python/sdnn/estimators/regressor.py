@@ -164,6 +164,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         return np.stack([outputs - width, outputs + width], axis=-1)
 
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
+        """Train, and with `calibrate` note the errors of samples that another network held out."""
         super()._fit(X, y, sample_weight)
         for name in ("held_out_residuals_", "held_out_counts_"):
             self.__dict__.pop(name, None)  # of an earlier fit
@@ -174,6 +175,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
             self.held_out_counts_ = held.weights
 
     def _set_outputs(self, y: ArrayLike) -> int:
+        """Note the outputs and their range; return the number of units."""
         targets = np.asarray(y)
         self._flat = targets.ndim == 1
         targets = targets.reshape(len(targets), -1)
@@ -184,6 +186,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         return self.n_outputs_ * self.n_output_units
 
     def _check_outputs(self, y: Floats, classes: ArrayLike | None) -> None:
+        """Refuse targets with another number of outputs than at the first ``fit``."""
         n_outputs = y.shape[1] if y.ndim > 1 else 1
         if n_outputs != self.n_outputs_:
             raise ValueError(

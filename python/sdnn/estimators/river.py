@@ -86,6 +86,7 @@ class RiverRegressor(StreamEstimator, base.Regressor):
         return np.array(targets, dtype=np.float64)[:, None]
 
     def _predict(self, sample: Sample) -> float:
+        """Predict by the mixture, or by the mean of the targets before the network is fitted."""
         if self.fitted is not None:
             return float(self._mix(self._estimates(sample))[0])
         if not self.targets:

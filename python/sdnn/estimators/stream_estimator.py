@@ -198,6 +198,7 @@ class StreamEstimator:
         return read if self.ranges is None else self.ranges.moved(read, learns)
 
     def _read(self, sample: Mapping[str, object]) -> dict[str, object]:
+        """Convert the values of known features; features that `sample` lacks are None."""
         get = sample.get
         return {
             name: None if (value := get(name)) is None else as_read(value)

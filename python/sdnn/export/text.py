@@ -115,6 +115,7 @@ def c_source(file: str, name: str, unused: Iterable[str] = ()) -> str:
 
 
 def _with_includes(file: str, included: set[str]) -> str:
+    """Return the text of a C file, each of its includes replaced by that file once."""
     included.add(file)
     text = (_FOLDER / file).read_text("utf-8")
     return _INCLUDE.sub(
@@ -300,6 +301,7 @@ def conversions(inputs: Sequence[Input], name: str, fraction_bits: int) -> tuple
     tables, names = Tables(name), dict[tuple[str | int, int], str]()
 
     def table(key: tuple[str | int, int], word: str, values: Array, comment: str) -> str:
+        """Return the name of a C table; tables with the same key are written once."""
         if key not in names:
             names[key] = f"{name}_{word}_{len(names)}"
             tables.add("int32_t", f"{word}_{len(names) - 1}", values, comment)

@@ -293,6 +293,7 @@ class Writer(ABC, Generic[Network]):
         return [*before, array, f"{self.name}_greedy({arguments}, action);"]
 
     def _action_value(self) -> str:
+        """Return the C expression of an action's value, for the header's comments."""
         if self.box is None:
             d, action = ("d", "action[d]") if self.is_vector else ("0", "action")
             return f"{self.name}_first_action[{d}] + (int32_t){action}"

@@ -171,6 +171,7 @@ def number_of(text: str, what: str) -> float:
     """Evaluate a formula of numbers, ``+ - * / ^`` and parentheses."""
 
     def value(node: ast.AST) -> float:
+        """Evaluate a node of the parsed expression: numbers and arithmetic only."""
         if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
             return float(node.value)
         if isinstance(node, ast.UnaryOp):

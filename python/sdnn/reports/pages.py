@@ -128,6 +128,7 @@ class Page:
         return self._render("page.html.jinja", call=call)
 
     def _render(self, name: str, **values: str) -> str:
+        """Fill the template `name` with the page; HTML is escaped."""
         from jinja2 import Environment, PackageLoader, StrictUndefined
 
         environment = Environment(

@@ -87,6 +87,7 @@ class Check(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     n_fewer: int = 0
 
     def __str__(self) -> str:
+        """Return the quantity in words, as the report's table names it."""
         if self.measure is None:  # the quantity is a ratio of times
             title = next(series.title for series in SERIES if series.id == self.series)
             return f"time per step, {self.n_inputs} inputs / {self.n_fewer} inputs: {title}"
@@ -255,6 +256,7 @@ def judge_claims(
 def _judge_check(
     check: Check, measured: Mapping[Subject, TrialMeasures], costs: Sequence[CostRecord]
 ) -> CheckOutcome:
+    """Estimate the quantity of a check, and judge it if it was measured in full."""
     if check.measure is None:  # the quantity is a ratio of times
         times = {c.n_inputs: c.microseconds for c in costs if c.series == check.series}
         if not {check.n_inputs, check.n_fewer} <= times.keys():

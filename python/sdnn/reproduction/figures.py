@@ -134,6 +134,7 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False, narrow: bool 
 
 
 def _watermark(axes: Axes) -> None:
+    """Mark a figure of a quick reproduction, so that it is not taken for the result."""
     axes.text(
         0.5, 0.6, "quick", transform=axes.transAxes, ha="center", va="center",
         fontsize=44, color=_WARNING_COLOR, alpha=0.13, weight="bold", zorder=0,
@@ -149,6 +150,7 @@ def _label(
     quick: bool,
     narrow: bool,
 ) -> None:
+    """Write title, warning and footer: the scale of the study and its configurations."""
     fewest, most = min(r.n_trials for r in results), max(r.n_trials for r in results)
     trials = f"{fewest}" if fewest == most else f"{fewest} to {most}"
     n_episodes = max(result.last_episode for result in results)

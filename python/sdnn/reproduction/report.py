@@ -143,6 +143,7 @@ class Report:
     def _first_sections(
         self, pictures: Mapping[str, bytes], narrow: Mapping[str, bytes]
     ) -> Iterator[Section]:
+        """Yield the sections before the appendix: claims, learning curves, costs."""
         if self.claims:
             table = _claim_table(self.claims)
             notes = [DECIDED_NOTE] if "verdict" in table.header else [INTERVALS_NOTE]

@@ -89,6 +89,7 @@ def environments_of(runs: Sequence[Run]) -> dict[str, EnvironmentSpec]:
 
 
 def _flat_settings(values: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, str]]:
+    """Yield the settings that distinguish curves: (dotted key, value as text)."""
     for name, value in values.items():
         if f"{prefix}{name}" in _IGNORED:
             continue
@@ -243,6 +244,7 @@ def _running_median(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _steps_and_values(rows: Sequence[Row], kind: Kind) -> Series:
+    """Return the steps and returns of a run's evaluations, or of its episodes."""
     wanted, name = ("evaluation", "mean_return") if kind == "evaluation" else ("episode", "return")
     matching = [row for row in rows if row["kind"] == wanted]
     steps = np.array([row["step"] for row in matching], np.int64)
@@ -317,6 +319,7 @@ def draw_curves(curves: Sequence[Curve], levels: Sequence[Level] = ()) -> Figure
 
 
 def _draw_curve(axes: Axes, curve: Curve, color: str) -> None:
+    """Draw the line of a curve and, over several runs, the band of their quartiles."""
     (line,) = axes.plot(curve.steps, curve.values, color=color)
     line.update(_look(curve.kind, len(curve.steps)))
     if curve.low is not None and curve.high is not None:

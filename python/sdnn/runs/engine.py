@@ -127,6 +127,7 @@ class TrialBars(ProgressBars):
                 self.update("counted", done, description=title)
 
     def _advance(self, planned: PlannedTrial, episode: int) -> None:
+        """Show the progress of a trial, and that of all trials together."""
         self.add(planned.key, planned.title, planned.spec.length)
         self._done[planned.key] = episode
         self.update(planned.key, episode)
@@ -215,6 +216,7 @@ def run_trials(
             store.add(message.record, is_exact=message.planned.spec.is_compiled)
 
     def keep(ended: Sequence[Finished | Failed]) -> None:
+        """Store trials that have ended together in one transaction, and note the failures."""
         nonlocal n_run
         failures.extend(message for message in ended if isinstance(message, Failed))
         finished = [message for message in ended if isinstance(message, Finished)]
@@ -286,6 +288,7 @@ def run_to_end(planned: PlannedTrial) -> Generator[Advanced | Finished, None, No
 def _make_record(
     planned: PlannedTrial, trial: Trial | TrainingTrial, seconds: float
 ) -> TrialRecord:
+    """Return the record of a finished trial for the store."""
     return TrialRecord(
         key=planned.key,
         config=planned.spec.canonical_json(),

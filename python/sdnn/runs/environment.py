@@ -275,6 +275,7 @@ class EnvironmentSpec(Settings, frozen=True):
         return low, high
 
     def _make_unwrapped(self, stream: NoiseStream, render_mode: str | None) -> Env:
+        """Make the environment without wrappers; ConfigError names the setting to blame."""
         options = {"disable_env_checker": True, **self.kwargs}
         if self.is_paper_acrobot:
             options["stream"] = stream

@@ -111,6 +111,7 @@ def draw_study(comparison: Comparison, footer: str, *, narrow: bool = False) -> 
 def _draw_case(
     pair: NDArray[np.object_], comparison: Comparison, case_id: str, *, with_names: bool
 ) -> None:
+    """Draw the two panels of a case: a row for each variant, the reference in bold."""
     measured = comparison.of_case(case_id)
     lines = {variant.id: line for line, variant in enumerate(comparison.variants)}
     reference = comparison.study.reference
@@ -166,6 +167,7 @@ def _draw_variant(
 
 
 def _label_case(axes: Axes, name: MeasureName, last: int) -> None:
+    """Set limits, ticks and labels of a panel by its measure; `last` is the last episode."""
     from matplotlib.ticker import FuncFormatter, MaxNLocator
 
     axes.set_xlabel(_TITLES[name], fontsize=8, color=INK)

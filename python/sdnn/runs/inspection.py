@@ -106,6 +106,7 @@ class Inspection:
         )
 
     def _sections(self) -> Iterator[Section]:
+        """Yield the sections of the page, from the map of values to the learning curves."""
         names = " and ".join(axis_label(i) for i in self.state_map.inputs)
         others = ", ".join(f"{n} = {x:.4g}" for n, x in self.state_map.typical.items())
         notes = [f"Other inputs are at their median: {others}."] if others else []
@@ -221,6 +222,7 @@ class Inspection:
         return bool(np.ptp(agent_input.numbers(self.states)) == 0.0)
 
     def _why_left_out(self, agent_input: AgentInput) -> str:
+        """Return why the agent does not read an input; empty for an input that it reads."""
         if agent_input.is_used:
             return ""
         if self._is_constant(agent_input):
@@ -280,6 +282,7 @@ class Inspection:
         return texts
 
     def _warnings_of_values(self) -> Iterator[str]:
+        """Warn of rewards or corrections too small for the resolution of the values."""
         report = self.report
         unit, reward = report.get("value_unit"), report.get("recent_reward")
         if unit and reward and reward < FEW_UNITS * unit:
@@ -295,6 +298,7 @@ class Inspection:
             )
 
     def _warnings_of_ranges(self) -> Iterator[str]:
+        """Warn of inputs that are constant, or whose range is too wide or too narrow."""
         for agent_input in self.inputs:
             use = self.range_use(agent_input)
             if agent_input.is_used and self._is_constant(agent_input):
@@ -338,6 +342,7 @@ class Inspection:
         return plain(figure)
 
     def _progress_at(self, steps: Floats, episodes: Sequence[Row]) -> Floats:
+        """Return the share of the goal that was reached at `steps`, in [0, 1]."""
         goal = self.run.goal
         if goal.steps is not None:
             return steps / goal.steps
@@ -424,6 +429,7 @@ def inspect_run(
 
 
 def _states(agent: AnyAgent, env: Env, root: int, options: Data | None) -> States:
+    """Collect states in episodes of `env`; RunError if it gives none."""
     try:
         return meet_states(agent, env, root % 2**32, options)
     except ValueError as error:

@@ -68,6 +68,7 @@ def record(
         run.check_spaces(agent, env)
 
         def frames() -> Iterator[NDArray[np.uint8]]:
+            """Yield the pictures of a greedy episode, and count them in `recording`."""
             for now in greedy_episode(agent, env, root, 0, run.reset_options(env)):
                 recording.total_reward = now.total_reward
                 for frame in _rendered(env):
@@ -102,6 +103,7 @@ def _rendered(env: Env) -> Iterator[NDArray[np.uint8]]:
 
 
 def _write_frames(path: Path, frames: Iterator[NDArray[np.uint8]], rate: float) -> None:
+    """Encode pictures as MP4 or GIF with ffmpeg, one at a time to save memory."""
     import imageio_ffmpeg
 
     is_gif = path.suffix == ".gif"

@@ -203,6 +203,7 @@ def changed_settings(before: str, after: str) -> dict[str, tuple[str, str]]:
 
 
 def _settings(table: Values, prefix: str = "") -> Iterator[tuple[str, str]]:
+    """Yield the settings of nested tables: (dotted key, value as JSON)."""
     for name, value in table.items():
         if isinstance(value, dict) and value:
             yield from _settings(value, f"{prefix}{name}.")
@@ -279,6 +280,7 @@ class StoredReports:
             yield ReportedTrial.of_record(record, goals, problem)
 
     def _load(self, store: ResultStore, key: TrialKey) -> tuple[TrialRecord, str]:
+        """Return the record of a trial, and the problem of its rows or an empty text."""
         try:
             return store.load([key])[0], ""
         except ChangedRowsError as error:

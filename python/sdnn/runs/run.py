@@ -119,6 +119,7 @@ class Run(Displayed):
         return cls(place, read_spec(path), checked_goals)
 
     def _facts(self) -> dict[str, object]:
+        """Return the facts that ``repr`` and notebooks display, by their labels."""
         return {
             "folder": self.folder,
             "task": self.spec.task,
@@ -131,6 +132,7 @@ class Run(Displayed):
         self._check().close()
 
     def _check(self) -> TrainingTrial:
+        """Make the trial, which raises for wrong settings, before the folder is made."""
         instruction_set()  # raises if the environment variable is wrong
         if not self.spec.protocol.seeded_episodes:
             raise ConfigError(
@@ -387,6 +389,7 @@ class _StoredCheckpoints(CheckpointCallback):
         super()._save(training)
 
     def _store_rows(self, training: Training) -> None:
+        """Store the rows since the last call, and clear them."""
         first = training.n_rows - len(self._rows)
         rows = TrialRows.from_training(self._rows, first)
         self._results.extend(

@@ -210,7 +210,7 @@ def with_changes(base: AnyPart, values: object, where: str, hint: str = "") -> A
     if "n_inputs" in values:
         raise ConfigError(f"{where}.n_inputs", "follows from the observations: omit it")
     values = check_names(values, [name for name in names if name != "n_inputs"], where, hint)
-    if not fields_of(type(base)):
+    if not fields_of(type(base)):  # a dataclass, which does not check its values
         kinds = _types_of_fields(base.__class__)
         values = {
             name: convert_value(kinds[name], v, f"{where}.{name}") for name, v in values.items()

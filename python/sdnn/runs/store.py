@@ -315,11 +315,11 @@ class ResultStore(AbstractContextManager["ResultStore"]):
         """Delete a run's rows from number ``first`` on; return the hash of the remaining rows."""
         hashed = self._hashes.get(run.id)
         later = "FROM rows WHERE run_id = ? AND number >= ?"
-        query = f"SELECT count(*) {later}"
-        (n_later,) = self._connection.execute(query, (run.id, first)).fetchone()
+        count = self._connection.execute(f"SELECT count(*) {later}", (run.id, first))
+        (n_later,) = count.fetchone()
         if n_later == 0 and hashed is not None and hashed.hexdigest() == run.checksum:
             return hashed
-        rows = self._rows(run).table
+        rows = self._rows(run).table  # raises if they have changed
         self._connection.execute(f"DELETE {later}", (run.id, first))
         return TrialRows(rows[rows["number"] < first]).hashed()
 

@@ -252,6 +252,7 @@ class StudyFile(Study):
         return layer
 
     def _import_modules(self) -> None:
+        """Import the modules that ``imports`` lists; they register environments and agents."""
         search_folder(self.file.path.resolve().parent)
         for number, module in enumerate(self.tables.study.imports):
             find_module(module)
@@ -262,6 +263,7 @@ class StudyFile(Study):
                 raise self.file.error(("study", "imports", number), problem) from error
 
     def _read_agents(self) -> Iterator[tuple[str, Layer]]:
+        """Yield (label, settings) of the tables ``[agents.LABEL]``."""
         for agent, table in self.tables.agents.items():
             if agent not in labels():
                 hint = advice(agent, labels())
@@ -298,6 +300,7 @@ class StudyFile(Study):
         )
 
     def _read_case(self, case_id: str) -> StudyCase:
+        """Return the case of ``[cases.ID]``; those of the paper have fixed settings."""
         where: KeyPath = ("cases", case_id)
         table = dict(self.tables.cases.get(case_id, {}))
         known = self.known_cases.get(case_id, StudyCase(case_id, case_id))
@@ -311,6 +314,7 @@ class StudyFile(Study):
         return StudyCase(case_id, title, fixed | settings, where)
 
     def _read_variants(self, cases: Sequence[StudyCase]) -> tuple[StudyVariant, ...]:
+        """Return the variants of ``[variants.NAME]``, then those of the axes."""
         variants: dict[str, StudyVariant] = {}
         known = [case.id for case in cases]
         for name, given in self.tables.variants.items():

@@ -276,6 +276,7 @@ def _difference(measured: Measured, name: MeasureName) -> str:
 
 
 def _measures_section(comparison: Comparison) -> Section:
+    """Return the section that explains the measures of the tables above."""
     measured, study = comparison.measured.values(), comparison.study
     copies = study.copies().items()
     notes = [f"The variant {variant} is the same as {first}." for variant, first in copies]

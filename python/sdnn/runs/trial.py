@@ -183,6 +183,7 @@ class TrialRows:
         return tests, np.flatnonzero(tests["part"] == 0)
 
     def _column(self, name: str, kind: type[np.generic]) -> Column:
+        """Return a column of the tests; where a test had several episodes, their mean."""
         tests, starts = self._tests
         if len(starts) == len(tests):
             return tests[name].astype(kind)

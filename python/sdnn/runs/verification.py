@@ -108,6 +108,7 @@ class Verification:
         return len(self.equal) == self.n_chosen and not self.differences
 
     def __str__(self) -> str:
+        """Return the outcome as the line that ``sdnn verify`` prints."""
         name = self.instruction_set
         name = name if name == "portable" else name.upper()
         n_different = sum(difference.was_run for difference in self.differences)

@@ -259,12 +259,14 @@ def explains_names(
     """
 
     def decorate(called: Called) -> Called:
+        """Wrap a function, or the constructor of a class."""
         if isinstance(called, type):
             called.__init__ = decorate(called.__init__)  # type: ignore[misc]
             return called
 
         @functools.wraps(called)
         def call(*arguments: Any, **options: Any) -> object:
+            """Call the function; explain a TypeError of the call itself, not of its body."""
             try:
                 return called(*arguments, **options)
             except TypeError as error:

@@ -33,6 +33,7 @@ class Displayed:
         return f"<{type(self).__name__}: {facts}>"
 
     def _repr_html_(self) -> str:
+        """Return the facts as an HTML table and the curve as SVG, for notebooks."""
         rows = "".join(
             f"<tr><th style='text-align:left'>{escape(name)}</th><td>{escape(str(fact))}</td></tr>"
             for name, fact in self._facts().items()

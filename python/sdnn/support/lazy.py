@@ -25,6 +25,7 @@ def attach(
     modules = {name: module for module, listed in names.items() for name in listed.split()}
 
     def load(name: str) -> Any:
+        """Import a module or a name from its module: the package's ``__getattr__``."""
         if name not in modules:
             from sdnn.support.habits import error_of_name
 

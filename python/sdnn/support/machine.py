@@ -59,6 +59,7 @@ def build() -> dict[str, str]:
 
 
 def _version_of(package: str) -> str:
+    """Return the version of an installed package, or "missing"."""
     from importlib import metadata
 
     try:

@@ -262,6 +262,7 @@ class TensorBoard(Callback):
 
 
 def _summary_writer() -> Callable[[str], Any]:
+    """Return the class that writes TensorBoard files, of the first package that has it."""
     for module in ("tensorboardX", "torch.utils.tensorboard"):
         try:
             make: Callable[[str], Any] = __import__(module, fromlist=["x"]).SummaryWriter

@@ -393,6 +393,7 @@ class Episodes:
                 )
 
     def _require_repeatable(self, n_saved: int) -> None:
+        """Refuse to repeat episodes in an environment where they could differ."""
         if n_saved != self.n_environments:
             raise ValueError(
                 f"env must have {n_saved} environments, as the training had,"

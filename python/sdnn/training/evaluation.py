@@ -169,6 +169,7 @@ def greedy_episode(
         n_steps, total, terminated, truncated = 0, 0.0, False, False
 
         def unusable(problem: object) -> UnusableStepError:
+            """Return the error for a step or reset that cannot be evaluated, with its place."""
             where = f"step {n_steps}" if n_steps else "the reset"
             return UnusableStepError(
                 f"env gave what cannot be evaluated, in {where} of greedy episode {number}:"

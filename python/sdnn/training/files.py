@@ -372,10 +372,10 @@ def read_training(path: Path) -> tuple[Any, SavedTraining]:
     """
     agent, description, arrays = read_agent(path, "training")
 
-    takes_missing = agent.missing != "error"
+    may_lack_readings = agent.missing != "error"
 
     def array(name: str) -> Array:
-        if name not in arrays or not (takes_missing or np.isfinite(arrays[name]).all()):
+        if name not in arrays or not (may_lack_readings or np.isfinite(arrays[name]).all()):
             raise ValueError(f"{path} is damaged: {name} must be there, of numbers")
         return arrays[name]
 
@@ -388,8 +388,8 @@ def read_training(path: Path) -> tuple[Any, SavedTraining]:
         saved = msgspec.convert(description.get("training"), SavedTraining)
     except msgspec.ValidationError as error:
         raise ValueError(f"{path} is damaged: training: {error}") from None
-    present = [
-        episode
+    episodes = [
+        episode  # None: no episode has begun in this environment
         and msgspec.structs.replace(
             episode,
             actions=actions(f"{_ARRAYS_OF_TRAINING}{i}.actions"),
@@ -397,4 +397,4 @@ def read_training(path: Path) -> tuple[Any, SavedTraining]:
         )
         for i, episode in enumerate(saved.present)
     ]
-    return agent, msgspec.structs.replace(saved, present=present)
+    return agent, msgspec.structs.replace(saved, present=episodes)

@@ -161,6 +161,7 @@ class Advised:
     if not TYPE_CHECKING:  # type checkers would accept every name
 
         def __getattr__(self, name: str) -> object:
+            """Suggest the right name for an attribute that other libraries' agents have."""
             kind = type(self)
             if not name.startswith("_") and not hasattr(kind, name):
                 elsewhere = {

@@ -132,6 +132,7 @@ class _CoreLearnerForAll(_LearnerForAll):
         return np.array(observation)
 
     def masks(self, masks: list[Mask]) -> NDArray[np.uint8]:
+        """Return the allowed actions of each environment as rows of flags."""
         rows = np.ones((len(masks), self._n_actions), np.uint8)
         for i, mask in enumerate(masks):
             if (row := self._mask("action_mask", mask)) is not None:
@@ -145,6 +146,7 @@ class _CoreLearnerForAll(_LearnerForAll):
         environments: list[int],
         masks: Any = None,
     ) -> Array:
+        """Choose an action in each of the `environments`; the others keep theirs."""
         chosen = actions.copy() if type(actions) is ndarray else self._batch(actions)
         self._core.act_each(observations, environments, chosen, masks)
         return chosen
@@ -236,6 +238,7 @@ class TrainingLoop(abc.ABC):
             raise KeyboardInterrupt
 
     def _begin(self) -> None:
+        """Prepare the loop: the first evaluation, the callbacks and the next pause."""
         if self._lacks_evaluation:
             self._report([self._evaluate()])
         n_environments = self._episodes.n_environments
@@ -348,11 +351,12 @@ class TrainingLoop(abc.ABC):
     def _set_next_call(self) -> None:
         """Compute the next step after which a callback, an evaluation or the end is due."""
         n = self.n_steps
-        intervals = [interval for interval, _ in self._listeners]
-        intervals += [] if self.evaluate_every is None else [self.evaluate_every]
-        goal = 2**62 if self.steps is None else self.steps
-        goal = min(goal, self._n_until_long) if n < self._n_until_long else goal
-        self._next_call = min([goal, *(n - n % interval + interval for interval in intervals)])
+        intervals = [*(interval for interval, _ in self._listeners), self.evaluate_every]
+        due = [n - n % interval + interval for interval in intervals if interval]  # next multiples
+        if n < self._n_until_long:
+            due.append(self._n_until_long)  # `pieces` warns there that the training is long
+        due.append(2**62 if self.steps is None else self.steps)  # 2**62: practically never
+        self._next_call = min(due)
 
     @property
     def is_finished(self) -> bool:
@@ -376,6 +380,7 @@ class TrainingLoop(abc.ABC):
         return False
 
     def _evaluate(self) -> Row:
+        """Evaluate the agent, with the present statistics of wrappers; return the row."""
         share_statistics(self.env, self.evaluation_env)
         evaluation = evaluate(
             self.agent,
@@ -388,8 +393,8 @@ class TrainingLoop(abc.ABC):
         return self._row("evaluation", episode=self.n_episodes, **evaluation.row())
 
     def _episode_row(self, environment: int) -> Row:
-        episode = self._episodes.present[environment]
-        assert episode is not None
+        """Return the row of the episode that has ended in an environment."""
+        episode: Any = self._episodes.present[environment]
         return self._row(
             "episode",
             episode=self.n_episodes,
@@ -404,6 +409,7 @@ class TrainingLoop(abc.ABC):
         return {"kind": kind, "step": self.n_steps, **values}
 
     def _report(self, rows: list[Row]) -> None:
+        """Store rows, and pass each to all callbacks."""
         for row in rows:
             self.rows.append(row)
             for callback in self.callbacks:

@@ -61,6 +61,7 @@ class TrainingResult(Displayed):
         return np.array(pairs, np.float64).reshape(-1, 2)
 
     def _facts(self) -> dict[str, object]:
+        """Return the facts that ``repr`` and notebooks display, by their labels."""
         last = [f"{mean:.5g}" for _, mean in self.evaluations[-1:]] or ["none"]
         facts: dict[str, object] = {"steps": self.n_steps, "episodes": self.n_episodes}
         if self.returns.size:

@@ -45,6 +45,7 @@ class _SyncEnvironments(EnvironmentAdapter):
         return dict(zip(seeds, self._converted(first), strict=True))
 
     def step(self, actions: Elements) -> Elements:
+        """Step every environment, and set `rewards`, `terminated` and `truncated`."""
         steps = self._call_each(range(self.n_environments), lambda env, i: env.take(actions[i]))
         columns = map(list, zip(*steps, strict=True))
         observations, self.rewards, self.terminated, self.truncated = columns
@@ -199,6 +200,7 @@ class _SeparateResets(_Vector):
     can_repeat = True
 
     def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Element]:
+        """Reset the environments that have an entry in `seeds`; return their observations."""
         mask = np.array([i in seeds for i in range(self.n_environments)])
         # Some wrappers can only reset all environments: leave the option out where all are reset.
         options = None if mask.all() else {"reset_mask": mask}
@@ -222,6 +224,7 @@ class _AutomaticResets(_Vector):
         self._after_resets: Elements | None = None
 
     def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Element]:
+        """Return first observations; only the first call resets, later ones were automatic."""
         if self._after_resets is None:
             observations, infos = reset_env(self._env, seeds[0], None)
             self._note_masks(infos, range(self.n_environments))
