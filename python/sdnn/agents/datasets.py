@@ -200,9 +200,9 @@ def _columns_in(item: Any) -> Data | None:
     """
     if isinstance(item, Mapping):
         return dict(item)
-    named = {name: getattr(item, name) for name in _columns_by_name() if hasattr(item, name)}
-    has_all = all(_value(named, name) is not None for name in ("observations", "rewards"))
-    return named if has_all else None
+    columns = {name: getattr(item, name) for name in _columns_by_name() if hasattr(item, name)}
+    has_all = all(_value(columns, name) is not None for name in ("observations", "rewards"))
+    return columns if has_all else None
 
 
 def _value(values: Info, name: str, default: Any = None) -> Any:
@@ -253,23 +253,23 @@ def _columns_of(values: Info, where: str = "dataset", *, is_episode: bool = Fals
     Columns such as ``observation_0`` are put together. Memory-mapped arrays stay on disk.
     """
     columns: Data = {}
-    parts: dict[str, dict[int, Any]] = {}
+    numbered_columns: dict[str, dict[int, Any]] = {}  # such as observation_0, by name and number
     for name, column in values.items():
         if column is None or _IGNORED.match(str(name)):
             continue
         numbered = _NUMBERED.fullmatch(str(name))
-        whole = _columns_by_name().get(str(name))
-        part = _columns_by_name().get(numbered[1]) if numbered and whole is None else None
-        if part is not None and numbered is not None:
-            parts.setdefault(part, {})[int(numbered[2])] = array_of(f"{where}[{name!r}]", column)
-        elif whole is not None:
-            require(whole not in columns, where, f"have {whole} once", [*values])
-            columns[whole] = _checked_column(f"{where}[{name!r}]", column)
+        usual = _columns_by_name().get(str(name))
+        if usual is not None:
+            require(usual not in columns, where, f"have {usual} once", [*values])
+            columns[usual] = _checked_column(f"{where}[{name!r}]", column)
+        elif numbered and (usual := _columns_by_name().get(numbered[1])) is not None:
+            same_name = numbered_columns.setdefault(usual, {})
+            same_name[int(numbered[2])] = array_of(f"{where}[{name!r}]", column)
         else:
             raise argument_error(
                 where, f"must have no {name!r}: {advice(str(name), NAMES)}; got {[*values]}"
             )
-    for name, numbers in parts.items():
+    for name, numbers in numbered_columns.items():
         expected = f"have columns of {name} numbered from 0"
         require([*sorted(numbers)] == [*range(len(numbers))], where, expected, sorted(numbers))
         columns[name] = np.stack([numbers[i] for i in range(len(numbers))], axis=-1)

@@ -78,9 +78,9 @@ def imitate(agent: SDNNQLambda | SDNNActorCritic, dataset: Dataset, *, epochs: i
     margin = _margin(agent, read)
     for _ in range(epochs):
         for steps, terminated in _episodes(agent, read()):
-            value = 0.0 if terminated else _value(agent, steps)
+            last_value = 0.0 if terminated else _value(agent, steps)
             agent.begin_episode()
-            for transition, target in zip(steps, _returns(agent, steps, value), strict=True):
+            for transition, target in zip(steps, _returns(agent, steps, last_value), strict=True):
                 agent._imitate_step(transition, target, margin)
     agent.begin_episode()
     return n * epochs

@@ -238,6 +238,7 @@ class Reader:
         Of several best actions it is the first, so that equal values give equal actions.
         """
         self.forget()
+        # For each state and dimension of the action: the values of all actions.
         all_parts = [self._parts(state) for state in states.rows]
         masks = [None] * len(all_parts) if states.allowed is None else list(states.allowed)
         parts = [self._allowed_parts(*pair) for pair in zip(all_parts, masks, strict=True)]
@@ -347,6 +348,7 @@ def meet_states(agent: AnyAgent, env: Env, seed: int = 0, options: Data | None =
                 break
         number += 1
     sizes = [mask.size for mask in watched.masks if mask is not None]
+    # A state without a mask allows all actions; without any mask the list is empty.
     masks = [np.ones(sizes[0], np.bool_) if m is None else m for m in watched.masks if sizes]
     states = States(np.array(watched.states), np.array(masks) if masks else None)
     states = states.chosen(np.isfinite(states.rows).all(axis=1))
@@ -381,8 +383,9 @@ def influences(
     # Fewer than 50 states would leave influences to chance, however slow they are to read.
     states = states.thinned(max(50, reader.most_reads // (N_SHUFFLES * n_used)))
     before = reader.read(states)
-    known = before.allowed.any(axis=0)
+    known = before.allowed.any(axis=0)  # actions that a mask allows in some state
     variances = before.action_values[:, known].var(axis=0, where=before.allowed[:, known])
+    # The root mean square difference of the values of two states drawn at random.
     spread = math.sqrt(2.0) * float(np.sqrt(variances.mean()))
     measured = []
     for agent_input in inputs:

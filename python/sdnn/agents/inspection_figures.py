@@ -64,8 +64,8 @@ def draw_map(
     """
     n_dimensions = min(state_map.actions.shape[-1], MOST_DIMENSIONS)
     n_panels = 1 + n_dimensions
-    size = (NARROW_WIDTH, 3.7 * n_panels) if narrow else (min(4.6 * n_panels, 14.0), 3.7)
-    figure = new_figure(*size)
+    inches = (NARROW_WIDTH, 3.7 * n_panels) if narrow else (min(4.6 * n_panels, 14.0), 3.7)
+    figure = new_figure(*inches)
     shape = (n_panels, 1) if narrow else (1, n_panels)
     panels = figure.subplots(*shape, squeeze=False).ravel()
     draw_values(panels[0], value_name, state_map, states)
@@ -152,7 +152,7 @@ def _draw_mesh(
     ):
         label(axis_label(agent_input), fontsize=9, color=INK)
         if agent_input.has_symbols:
-            every = max(1, len(numbers_of) // 12)
+            every = max(1, len(numbers_of) // 12)  # about a dozen labels have room
             axis.set_ticks(np.arange(len(numbers_of))[::every])
             axis.set_ticklabels([f"{number:g}" for number in numbers_of[::every]])
         else:
@@ -214,22 +214,22 @@ def draw_influences(measured: Sequence[Influence], *, narrow: bool = False) -> F
 
     ``measured`` is in the order of `influences`, the largest first; the first ones are drawn.
     """
-    shown = list(measured)[:MOST_BARS]
-    height = 1.0 + 0.27 * len(shown)  # in inches: title and axis, and a bar for each input
+    bars = list(measured)[:MOST_BARS]
+    height = 1.0 + 0.27 * len(bars)  # in inches: title and axis, and a bar for each input
     figure = new_figure(*((NARROW_WIDTH, 2.0 * height) if narrow else (WIDTH, height)))
     panels = figure.subplots(*((2, 1) if narrow else (1, 2)), sharey=not narrow)
-    heights = np.arange(len(shown))
+    heights = np.arange(len(bars))
     for panel, name, title, color in (
         (panels[0], "on_values", "change of values", color_of(0)),
         (panels[1], "on_actions", "change of greedy actions", color_of(1)),
     ):
-        panel.barh(heights, [100 * getattr(i, name) for i in shown], color=color, height=0.62)
+        panel.barh(heights, [100 * getattr(i, name) for i in bars], color=color, height=0.62)
         panel.set_title(title, loc="left", fontsize=9.5, color=INK)
         panel.set_xlabel("%", fontsize=9, color=INK)
         panel.set_xlim(left=0)
         style(panel, "x")
     for panel in panels if narrow else panels[:1]:
-        panel.set_yticks(heights, [i.input.name for i in shown])
+        panel.set_yticks(heights, [i.input.name for i in bars])
         panel.invert_yaxis()
     return plain(figure)
 
@@ -243,23 +243,23 @@ def draw_replay(
     narrow: bool = False,
 ) -> Figure:
     """Draw inputs, values and actions over the steps of a greedy episode."""
-    shown = [agent_input for agent_input in inputs if agent_input.is_used][:MOST_STRIPS]
+    drawn_inputs = [agent_input for agent_input in inputs if agent_input.is_used][:MOST_STRIPS]
     n_dimensions = min(episode.actions.shape[1], MOST_DIMENSIONS)
-    n_strips = len(shown) + 1 + n_dimensions
+    n_strips = len(drawn_inputs) + 1 + n_dimensions  # inputs, the value, actions
     figure = new_figure(NARROW_WIDTH if narrow else WIDTH, 0.6 + 0.85 * n_strips)
     panels = figure.subplots(n_strips, 1, sharex=True, squeeze=False)[:, 0]
     steps = np.arange(len(episode.values))
     line = "-" if len(steps) > 1 else "."
-    for panel, agent_input in zip(panels, shown, strict=False):
+    for panel, agent_input in zip(panels, drawn_inputs, strict=False):
         numbers = agent_input.numbers(episode.states)
         drawn = "steps-post" if agent_input.has_symbols else "default"
         panel.plot(steps, numbers, line, color=color_of(5), linewidth=1.0, drawstyle=drawn)
         _name_strip(panel, agent_input.name)
-    values = panels[len(shown)]
+    values = panels[len(drawn_inputs)]
     values.plot(steps, episode.values, line, color=color_of(0), linewidth=1.2)
     _name_strip(values, value_name)
     for d in range(n_dimensions):
-        panel = panels[len(shown) + 1 + d]
+        panel = panels[len(drawn_inputs) + 1 + d]
         drawn = "steps-post" if is_discrete(agent) else "default"
         actions = episode.actions[:, d]
         panel.plot(steps, actions, line, color=color_of(1), linewidth=1.0, drawstyle=drawn)

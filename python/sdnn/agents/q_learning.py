@@ -101,14 +101,13 @@ class ValueAgent(Agent[Approximator, Learning], abc.ABC, Generic[Approximator, L
         """
         controller = self._require_warm()
         use = controller.range_use()
-        inside: set[int] = set()
+        read: set[int] = set()  # variables that the agent's inputs read; a symbol is [first, n]
         for kind, variables in controller.inputs:
-            first, last = variables[0], variables[-1]
-            inside.update(range(first, first + last) if kind == "symbol" else variables)
+            read.update(range(variables[0], sum(variables)) if kind == "symbol" else variables)
         ranges = zip(*controller.ranges, strict=True)
         declared = list(zip(self._observation.low, self._observation.high, strict=True))
         return {
-            "left_out": [i for i in range(len(use)) if i not in inside],
+            "left_out": [i for i in range(len(use)) if i not in read],
             "fitted": []
             if self.has_running_ranges
             else [i for i, ends in enumerate(ranges) if ends != declared[i]],

@@ -205,12 +205,13 @@ def train_run(
         steps=steps, episodes=episodes, callbacks=callbacks, repeat_episodes=repeat_episodes
     )
     if as_json:
-        shown = {k: v for k, v in vars(outcome).items() if k not in ("has_pictures", "scaling")}
-        click.echo(json_text({"folder": str(run.folder), **shown}))
+        facts = {k: v for k, v in vars(outcome).items() if k not in ("has_pictures", "scaling")}
+        click.echo(json_text({"folder": str(run.folder), **facts}))
         return
     report = outcome.learning_report
     within, beyond = [], []
     if report is not None and not outcome.is_solved:  # a solved task needs no other ranges
+        # A range is much too wide if less than a tenth is used, too narrow if more is beyond it.
         shares = enumerate(report["share_of_range"])
         within = [i for i, s in shares if s and s < 0.1 and i not in report["fitted"]]
         beyond = [i for i, s in enumerate(report["share_beyond_range"]) if s and s > 0.1]

@@ -100,10 +100,10 @@ def study_command(make_study: Callable[..., Study]) -> Function:
                 raise click.UsageError(text) from error
             if dry_run:
                 estimate = forecast(study, out, executor.jobs)
-                shown = {"out": out, "duration": duration_words, **estimate}
                 text = json.dumps(estimate, indent=2)
                 if not as_json:
-                    text = rendered("forecast.txt.jinja", **shown)
+                    values = {"out": out, "duration": duration_words, **estimate}
+                    text = rendered("forecast.txt.jinja", **values)
                 click.echo(text, nl=bool(text))
                 return
             with TrialBars(Console(stderr=True)) as observer:
@@ -126,11 +126,11 @@ def study_command(make_study: Callable[..., Study]) -> Function:
         else:
             done.page.print(make_console(), full=full)
             page = next(str(file) for file in done.files if file.suffix == ".html")
-            done_now = ""
+            summary = ""
             if outcome.n_planned:
                 digest = str(done.table["digest"])[:16]
-                done_now = f"{stored} ({outcome.n_run} run now); digest of the rows {digest}; "
-            click.echo(f"{done_now}wrote {len(done.files)} files: see {page}")
+                summary = f"{stored} ({outcome.n_run} run now); digest of the rows {digest}; "
+            click.echo(f"{summary}wrote {len(done.files)} files: see {page}")
         if done.page is None or outcome.failures:
             raise click.exceptions.Exit(1)
 

@@ -46,20 +46,20 @@ def _options() -> list[click.Option]:
     for key in KEYS:
         schema: dict[str, Any] = {"$ref": "RunSpec"}
         for name in key.split("."):
-            parts = (schema, *schema.get("anyOf", ()))
-            reference = next(part["$ref"] for part in parts if "$ref" in part)
+            schemes = (schema, *schema.get("anyOf", ()))  # `anyOf`: a table that may be null
+            reference = next(scheme["$ref"] for scheme in schemes if "$ref" in scheme)
             table = reference.rpartition("/")[2]
             schema = schemas[table]["properties"][name]
         types = (part for part in schema.get("anyOf", ()) if part.get("type") != "null")
         kind = next(types, schema)
         is_flag, default = kind.get("type") == "boolean", schema.get("default")
-        shown = "" if default is None or is_flag else f"  [default: {default}]"
+        default_text = "" if default is None or is_flag else f"  [default: {default}]"
         option = click.Option(
             [option_of(key), key.replace(".", "_")],
             type=None if is_flag else _option_type(kind),
             is_flag=is_flag,
             default=None,
-            help=schema["description"].replace("`", "") + shown,
+            help=schema["description"].replace("`", "") + default_text,
         )
         options.append(option)
     return options
@@ -175,7 +175,7 @@ def _options_by_key(env_id: str | None, options: Options) -> Options:
     values = {k: value for k, value in by_key.items() if value is not None and value is not False}
     by_option = {key: (option_of(key), value) for key, value in values.items()}
 
-    def give(option: str, key: str, value: object) -> None:
+    def set_once(option: str, key: str, value: object) -> None:
         """Set `key` to the value of an option; refuse a key that another option has set."""
         other, before = by_option.setdefault(key, (option, value))
         if other != option:
@@ -185,20 +185,20 @@ def _options_by_key(env_id: str | None, options: Options) -> Options:
         values[key] = value
 
     if env_id is not None:
-        give("ENV_ID", "environment.id", env_id)
+        set_once("ENV_ID", "environment.id", env_id)
     for name, text in named_values("--env-arg", options["kwargs"]):
-        give(f"--env-arg {name}", f"environment.kwargs.{name}", value_of(text))
+        set_once(f"--env-arg {name}", f"environment.kwargs.{name}", value_of(text))
     for text in options["ranges"]:
         if text in ("adaptive", "running"):
-            give("--range", "agent.observation_range", text)
+            set_once("--range", "agent.observation_range", text)
         else:
             name, bounds = _named_range(text)
-            give(f"--range {name}", f"environment.ranges.{name}", bounds)
+            set_once(f"--range {name}", f"environment.ranges.{name}", bounds)
     for name, text in named_values("--set", options["settings"]):
         if "." not in name:
             example = advice(name, (), KEYS_BY_NAME) or "such as learning.discount"
             raise click.UsageError(f"--set {name}: must be TABLE.NAME; {example}")
-        give(f"--set {name}", name, value_of(text))
+        set_once(f"--set {name}", name, value_of(text))
     return values
 
 

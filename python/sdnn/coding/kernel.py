@@ -117,13 +117,13 @@ class AnalyticKernel:
         if not isinstance(coding, Sequence) or not coding:
             raise ValueError(f"coding must be a coding, or one for each input, got {shown(coding)}")
         inputs = range(len(coding))
-        every = [(mu, nu) for mu in inputs for nu in inputs if mu != nu] or [(0, 0)]
+        all_pairs = [(mu, nu) for mu in inputs for nu in inputs if mu != nu] or [(0, 0)]
         self.codings = tuple(fitted(of_input, n_units) for of_input in coding)
-        self.pairs = tuple(every) if pairs is None else _read_pairs(pairs, len(inputs))
+        self.pairs = tuple(all_pairs) if pairs is None else _read_pairs(pairs, len(inputs))
         self.has_all_pairs = pairs is None
-        keys = list(map(pattern_key, self.codings))
-        different = dict(zip(keys, self.codings, strict=True))
-        matrices = {key: of_key.correlations(n_units) for key, of_key in different.items()}
+        keys = list(map(pattern_key, self.codings))  # equal codings share a matrix
+        by_key = dict(zip(keys, self.codings, strict=True))
+        matrices = {key: coding.correlations(n_units) for key, coding in by_key.items()}
         self._correlations = [matrices[key] for key in keys]
 
     def __call__(self, X: ArrayLike, Y: ArrayLike | None = None) -> NDArray[np.float64]:

@@ -175,22 +175,22 @@ class RandomInverse(Ranged):
 
     def _bins_and_flips(self, n_units: int) -> tuple[int, int]:
         """Return the numbers of bins and of units flipped per bin, given or by the length scale."""
-        most = n_units // 2
+        most_flipped = n_units // 2
         n_bins = None if self.n_bins is None else whole("n_bins", self.n_bins, 2, MAX_BINS)
         if self.n_flipped is not None:
-            flipped = whole("n_flipped", self.n_flipped, 1, most)
+            flipped = whole("n_flipped", self.n_flipped, 1, most_flipped)
         elif n_bins is not None:
             # Flipping f units of each sign a bin takes 4 f / n from the correlation of neighbours.
             correlation = math.exp(-1 / (n_bins * self.length_scale))
-            flipped = min(most, max(1, round(n_units * (1 - correlation) / 4)))
+            flipped = min(most_flipped, max(1, round(n_units * (1 - correlation) / 4)))
         else:
             flipped = max(1, math.ceil(n_units / (4 * self.length_scale * FINE)))
             expected = f"be at least {1 / (2 * FINE)}"
-            require(flipped <= most, "length_scale", expected, self.length_scale)
+            require(flipped <= most_flipped, "length_scale", expected, self.length_scale)
         if n_bins is not None:
             return n_bins, flipped
-        per_length = n_units / (4 * flipped)
-        n_bins = min(MAX_BINS, max(2, round(per_length / self.length_scale)))
+        bins_per_length_scale = n_units / (4 * flipped)
+        n_bins = min(MAX_BINS, max(2, round(bins_per_length_scale / self.length_scale)))
         if n_bins < FEW_BINS and self.n_flipped is None:
             warnings.warn(
                 f"length_scale={self.length_scale} with patterns of {n_units} units leaves "

@@ -20,8 +20,8 @@ Category = str | float | int | bool
 def is_missing(value: object) -> bool:
     """Return whether a value is None, NaN or pandas.NA."""
     try:
-        return value is None or bool(value != value)
-    except TypeError:
+        return value is None or bool(value != value)  # NaN differs from itself
+    except TypeError:  # pandas.NA is neither true nor false
         return True
 
 

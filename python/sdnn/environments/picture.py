@@ -42,8 +42,8 @@ class AcrobotMotion:
     def __init__(self, config: AcrobotConfig) -> None:
         n_steps = round(config.decision_interval / config.integration_step)
         # A quotient that rounding left just below a whole number counts as that number.
-        most = max(1, int(_LONGEST / config.integration_step * (1.0 + 1e-9)))
-        n_joined = next(n for n in range(min(most, n_steps), 0, -1) if n_steps % n == 0)
+        most_joined = max(1, int(_LONGEST / config.integration_step * (1.0 + 1e-9)))
+        n_joined = next(n for n in range(min(most_joined, n_steps), 0, -1) if n_steps % n == 0)
         self.interval = n_joined * config.integration_step
         self._n_intervals = n_steps // n_joined
         config_between = dataclasses.replace(
@@ -82,6 +82,7 @@ class AcrobotPicture:
         self._large_font = pygame.font.Font(None, 24 * _FINE)
         self._canvas = pygame.Surface((_SIZE * _FINE, _SIZE * _FINE))
         self._reach = config.link_length_1 + config.link_length_2
+        # Pixels per metre: the links reach from the middle almost to the border.
         self._scale = 0.42 * _SIZE * _FINE / max(self._reach, abs(config.goal_height))
         self._window: pygame.Surface | None = None
         if window_fps is not None:
@@ -105,7 +106,7 @@ class AcrobotPicture:
         self._draw_background(solved)
         self._draw_link(0j, elbow, _LINK_1)
         self._draw_link(elbow, tip, _LINK_2)
-        for centre, radius in ((0j, 0.075), (elbow, 0.065)):
+        for centre, radius in ((0j, 0.075), (elbow, 0.065)):  # of the joints, in metres
             self._disc(centre, radius, _INK)
             self._disc(centre, 0.55 * radius, _PAPER)
         self._disc(tip, 0.06, _GOAL if solved else _INK)

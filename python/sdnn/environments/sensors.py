@@ -129,11 +129,11 @@ class RedundantSensors(_Sensors):
             for function in functions
         )
         n = len(self._functions)
-        ends = [(0.0, 1.0)] * n if bounds is None else bounds
-        if len(ends) != n:
-            raise ValueError(f"bounds must have {n} entries, one per function, got {len(ends)}")
-        low: Array = np.append(self._space.low, [low for low, _ in ends])
-        high: Array = np.append(self._space.high, [high for _, high in ends])
+        ranges = [(0.0, 1.0)] * n if bounds is None else bounds
+        if len(ranges) != n:
+            raise ValueError(f"bounds must have {n} entries, one per function, got {len(ranges)}")
+        low: Array = np.append(self._space.low, [low for low, _ in ranges])
+        high: Array = np.append(self._space.high, [high for _, high in ranges])
         self.observation_space = gym.spaces.Box(
             low.astype(self._float), high.astype(self._float), dtype=self._float
         )
@@ -204,6 +204,7 @@ class NoisySensors(_RandomSensors):
         (n_channels,) = self._space.shape
         if not (np.all(self._space.low >= 0.0) and np.all(self._space.high <= 1.0)):
             raise ValueError("the observation space must lie within [0, 1] in every channel")
+        # Sensors of the acrobot: its first two readings are angles.
         edges = (["wrap"] * 2 + ["saturate"] * n_channels)[:n_channels]
         if edge is not None:
             edges = [edge] * n_channels if isinstance(edge, str) else list(edge)

@@ -88,7 +88,7 @@ def _problem_of_space(space: Space) -> str:
     )
 
 
-def wholes_of(space: Space) -> list[tuple[int, int]] | None:
+def integer_bounds(space: Space) -> list[tuple[int, int]] | None:
     """Return the smallest and largest integer of each dimension; None for spaces of reals."""
     if isinstance(space, gym.spaces.Discrete):
         return [(int(space.start), int(space.start) + int(space.n) - 1)]
@@ -109,8 +109,8 @@ def space_data(space: Space) -> Data:
     """Return a space as data that JSON can hold; TypeError for other kinds of spaces."""
     dtype = np.dtype(space.dtype).str
     if isinstance(space, gym.spaces.Box):
-        ends = [_finite_or_text(space.low), _finite_or_text(space.high)]
-        return {"box": ends, "shape": list(space.shape), "dtype": dtype}
+        bounds = [_finite_or_text(space.low), _finite_or_text(space.high)]
+        return {"box": bounds, "shape": list(space.shape), "dtype": dtype}
     if isinstance(space, gym.spaces.Discrete):
         return {"discrete": int(space.n), "start": int(space.start), "dtype": dtype}
     if isinstance(space, gym.spaces.MultiDiscrete):
@@ -156,13 +156,13 @@ def _finite_or_text(values: Array) -> list[Any]:
 
 def space_of(data: Mapping[str, Any]) -> Space:
     """Make the space that `space_data` described; ValueError if the data is invalid."""
-    kind = data.get("dtype", "<f4")
-    require(kind in _TYPES, "dtype", "be that of numbers", kind)
+    type_code = data.get("dtype", "<f4")
+    require(type_code in _TYPES, "dtype", "be that of numbers", type_code)
     sizes = [data.get("discrete", 0), *np.ravel(data.get("multi_discrete", 0)).tolist()]
     sizes += [int(np.prod(data.get("multi_binary", 0)))]
     if not all(isinstance(size, int) and 0 <= size <= _MOST_VALUES for size in sizes):
         raise ValueError(f"a space must have at most {_MOST_VALUES} values, got {sizes}")
-    dtype: Any = np.dtype(kind)
+    dtype: Any = np.dtype(type_code)
     if "box" in data:
         try:
             with np.errstate(over="raise"):
@@ -339,9 +339,9 @@ def _other_bounds(space: Any, other_space: Any, part: str = "") -> Iterator[str]
 
 def _bounds(space: Any) -> NDArray[np.float64]:
     """Return the lowest and the highest value of each variable, shape (n, 2)."""
-    wholes = wholes_of(space)
-    if wholes is not None:
-        return np.array(wholes, np.float64).reshape(-1, 2)
+    bounds = integer_bounds(space)
+    if bounds is not None:
+        return np.array(bounds, np.float64).reshape(-1, 2)
     return np.stack([with_infinities(np.ravel(end)) for end in (space.low, space.high)], axis=1)
 
 
@@ -374,13 +374,13 @@ def _can_observe(space: Space, other_space: Space) -> bool:
         )
     if isinstance(space, gym.spaces.Tuple) and isinstance(other_space, gym.spaces.Tuple):
         return len(space) == len(other_space) and all(map(_can_observe, space, other_space))
-    other_wholes, wholes = wholes_of(other_space), wholes_of(space)
+    other_bounds, bounds = integer_bounds(other_space), integer_bounds(space)
     if isinstance(space, gym.spaces.Box):
-        has_numbers = isinstance(other_space, gym.spaces.Box) or other_wholes is not None
+        has_numbers = isinstance(other_space, gym.spaces.Box) or other_bounds is not None
         return has_numbers and space.shape == other_space.shape
-    if space.shape != other_space.shape or other_wholes is None or wholes is None:
+    if space.shape != other_space.shape or other_bounds is None or bounds is None:
         return False
-    pairs = zip(other_wholes, wholes, strict=True)
+    pairs = zip(other_bounds, bounds, strict=True)
     return all(
         low <= other_low and other_high <= high for (other_low, other_high), (low, high) in pairs
     )
@@ -389,7 +389,8 @@ def _can_observe(space: Space, other_space: Space) -> bool:
 def _has_equal_actions(space: Space, other_space: Space) -> bool:
     if isinstance(space, gym.spaces.Box) and isinstance(other_space, gym.spaces.Box):
         return space.low.size == other_space.low.size
-    return wholes_of(space) is not None and wholes_of(space) == wholes_of(other_space)
+    bounds = integer_bounds(space)
+    return bounds is not None and bounds == integer_bounds(other_space)
 
 
 def space_words(space: Space) -> str:

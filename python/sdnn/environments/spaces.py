@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sdnn import _core
-from sdnn.environments.space_kinds import flat_bounds, in_a_line, wholes_of, with_infinities
+from sdnn.environments.space_kinds import flat_bounds, in_a_line, integer_bounds, with_infinities
 from sdnn.environments.types import Array, Element, Elements, Space
 from sdnn.support.arguments import argument_error, array_of, blamed, require, shown
 
@@ -188,7 +188,7 @@ def _symbols_of(space: Space, first: int = 0) -> Iterator[tuple[int, int]]:
             yield from _symbols_of(part, first)
             first += gym.spaces.flatdim(part)
     elif isinstance(space, gym.spaces.Discrete | gym.spaces.MultiDiscrete):
-        for low, high in wholes_of(space) or ():
+        for low, high in integer_bounds(space) or ():
             n = high - low + 1
             yield first, n
             first += n
@@ -218,8 +218,8 @@ def _ranges(
                 f"observation_range must be two numbers or two times {low.size},"
                 f" got {shown(ranges)}"
             ) from None
-    known = np.isfinite(low) & np.isfinite(high)
-    for i in np.flatnonzero(known & (low >= high)):
+    has_range = np.isfinite(low) & np.isfinite(high)
+    for i in np.flatnonzero(has_range & (low >= high)):
         name, way_out = "observation_range", ""
         if ranges is None:
             name = "observation_space"
@@ -229,7 +229,7 @@ def _ranges(
         raise ValueError(
             f"{name} must have low < high, got {low[i]} to {high[i]} of variable {i}{way_out}"
         )
-    return np.where(known, low, np.nan), np.where(known, high, np.nan)
+    return np.where(has_range, low, np.nan), np.where(has_range, high, np.nan)
 
 
 class Actions:
@@ -255,12 +255,12 @@ class Actions:
         self.space = space
         self.has_masks = False
         self.is_box = isinstance(space, gym.spaces.Box)
-        wholes = wholes_of(space)
-        self.n_actions = [last - first + 1 for first, last in wholes or ()]
+        bounds = integer_bounds(space)
+        self.n_actions = [last - first + 1 for first, last in bounds or ()]
         if isinstance(space, gym.spaces.Box):
             low, high = np.ravel(space.low), np.ravel(space.high)
-        elif wholes is not None:
-            low, high = np.array(wholes, np.float64).reshape(-1, 2).T
+        elif bounds is not None:
+            low, high = np.array(bounds, np.float64).reshape(-1, 2).T
         else:
             raise TypeError(
                 "action_space must be a Box, Discrete, MultiDiscrete or MultiBinary,"

@@ -191,6 +191,7 @@ class BaseSDNN(Fitted, CodedInputs):
         return weights
 
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
+        """Train the network: with a hold-out to stop early, then again on all samples to refit."""
         if self.warm_start and self.refit:
             raise ValueError("refit=True trains a new network: it cannot be with warm_start=True")
         if self.warm_start and self.calibrate:
@@ -210,13 +211,15 @@ class BaseSDNN(Fitted, CodedInputs):
         targets = self._targets(observed, at_once=True)
         bins = self.network_.input_code.bins(table)
         share = self.validation_fraction if self.early_stopping else 0.0
-        held, learned_rows = held_out(share, random, len(table))
+        held_rows, learned_rows = held_out(share, random, len(table))
 
         def score() -> float:
-            weights_of_held = None if weights is None else weights[held]
-            return self._validation_score(bins[held], targets[held], weights_of_held)
+            """Return the score of the present network on the samples that are held out."""
+            held_weights = None if weights is None else weights[held_rows]
+            return self._validation_score(bins[held_rows], targets[held_rows], held_weights)
 
         def train(rows: Rows, max_iter: int, n_averaged: int) -> tuple[Trainer, History]:
+            """Train on some samples for at most `max_iter` epochs; return trainer and history."""
             weights_of_rows = None if weights is None else weights[rows]
             scored = score if self.early_stopping and rows is learned_rows else None
             times = self._presentations(targets[rows], weights_of_rows)

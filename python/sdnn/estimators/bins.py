@@ -55,7 +55,7 @@ class InputBins:
         values = table[:, used]
         inside = np.minimum(np.maximum(values, low), high)
         positions = (inside / 2 - low / 2) / half_width  # as in `sdnn.coding.numeric`
-        is_missing = values != values
+        is_missing = values != values  # NaN
         positions[is_missing] = 0
         bins: Ints = np.minimum((positions * sizes).astype(np.int32), sizes - 1)
         return np.where(is_missing, sizes, bins)

@@ -104,17 +104,19 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
         small = n_samples <= MOST_CALIBRATED
         return small and self._has_several_units() and not self.warm_start
 
-    def _calibrated_steepness(self, held: HeldOut, each: Floats | None) -> float:
+    def _calibrated_steepness(self, held: HeldOut, weights_by_class: Floats | None) -> float:
         """Return the steepness with the smallest log loss on samples that are held out.
 
-        ``each`` are the weights of all samples by their classes.
+        ``weights_by_class`` are those of all samples.
 
         Half a sample more has a random class, because a few samples may all be predicted rightly.
         """
         model = cast(SDNNClassifier, held.model)
         scores = model._scores(model._bins(held.X), self._n_threads())
         targets = model._targets(held.y)
-        weights = held.weights if each is None else held.weights * each[held.rows]
+        weights = held.weights
+        if weights_by_class is not None:
+            weights = weights * weights_by_class[held.rows]
         if not weights.any():
             raise CalibrationError(
                 "calibrate must be False where all samples that are held out have no weight"
@@ -253,10 +255,11 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
 
     def _presentations(self, targets: Ints, weights: Floats | None) -> Floats | None:
         """Return the weight of each sample, times that of its class; None if all are equal."""
-        each = class_weights(self.class_weight, self.classes_[targets])
-        if each is None or weights is None:
-            return weights if each is None else each
-        return sample_weights(each * weights, len(targets), name="class_weight times sample_weight")
+        by_class = class_weights(self.class_weight, self.classes_[targets])
+        if by_class is None or weights is None:
+            return weights if by_class is None else by_class
+        product = by_class * weights
+        return sample_weights(product, len(targets), name="class_weight times sample_weight")
 
     def _validation_score(self, bins: Ints, targets: Ints, weights: Floats | None) -> float:
         winners = self._winners(self._decision(bins, self._n_threads()))

@@ -184,12 +184,14 @@ def input_pairs(
     500
     """
     if isinstance(pairs, str):
-        away: NDArray[np.int64] = np.arange(1, n_inputs)
-        if pairs != "all" and n_inputs * len(away) > PAIR_BUDGET:
+        # Offsets from a feature to its modifiers; within the budget, a random share of them.
+        offsets: NDArray[np.int64] = np.arange(1, n_inputs)
+        if pairs != "all" and n_inputs * len(offsets) > PAIR_BUDGET:
             random = np.random.RandomState(seed)
-            away = random.permutation(away)[: max(1, PAIR_BUDGET // n_inputs)]
+            offsets = random.permutation(offsets)[: max(1, PAIR_BUDGET // n_inputs)]
         inputs = range(n_inputs)
-        return sorted((mu, int(mu + step) % n_inputs) for mu in inputs for step in away) or [(0, 0)]
+        chosen = [(mu, int(mu + offset) % n_inputs) for mu in inputs for offset in offsets]
+        return sorted(chosen) or [(0, 0)]
     is_listed = isinstance(pairs, Iterable) and not isinstance(pairs, Iterator)
     require(is_listed, "pairs", "be a list of (modified, modifier)", pairs)
     indices: Pairs = []

@@ -152,25 +152,24 @@ class Fitted(Learned):
         Raises TypeError if a parameter cannot be written as JSON, such as a user-defined coding.
         """
         check_is_fitted(self, "network_")
-        held, code = vars(self), self.network_.input_code
+        state, code = vars(self), self.network_.input_code
         tables = {id(table): table for table in (*code.modified, *code.modifiers)}
         number_of = {key: number for number, key in enumerate(tables)}
         networks = (self.network_, *self._earlier)
-        arrays = {name: held[name] for name in ATTRIBUTES if isinstance(held.get(name), np.ndarray)}
+        fitted = {name: state[name] for name in ATTRIBUTES if name in state}
+        arrays = {name: value for name, value in fitted.items() if isinstance(value, np.ndarray)}
         for number, table in enumerate(tables.values()):
             arrays[f"table.{number}"] = np.packbits(table > 0, axis=1)
         for number, network in enumerate(networks):
             arrays[f"weights.{number}"] = in_smallest_type(network.layer.weights)
             arrays[f"thresholds.{number}"] = in_smallest_type(network.layer.thresholds)
-        attributes = {
-            name: held[name] for name in ATTRIBUTES if name in held and name not in arrays
-        }
+        attributes = {name: value for name, value in fitted.items() if name not in arrays}
         parameters = self.get_params(deep=False)
         description = {
             "class": type(self).__name__,
             "parameters": {name: json_value(value) for name, value in parameters.items()},
             "attributes": attributes,
-            "names": {name: typed_list(held[name]) for name in NAMES if name in held},
+            "names": {name: typed_list(state[name]) for name in NAMES if name in state},
             "codings": [description_of(index, coding) for index, coding in enumerate(code.codings)],
             "pairs": code.pairs,
             "n_units": self.network_.n_units,
@@ -350,13 +349,14 @@ def require_consistent(estimator: Fitted) -> None:
 
 def require_fitted(coding: Coding, n_units: int) -> Coding:
     """Return a coding that is fitted; ValueError if it is not, or a field of it is wrong."""
+    # Fitted again, to its own categories or range, a coding must not change.
     base = present(coding)
     if isinstance(base, Categorical):
         values = np.empty(base.size, object)
         values[:] = base.categories
     else:
         values = np.array(base.ends() or (0.0,))
-    if coding.fit(values, n_units) != coding:  # fit changes nothing of a fitted coding
+    if coding.fit(values, n_units) != coding:
         raise ValueError(f"{coding} is not fitted")
     return coding
 

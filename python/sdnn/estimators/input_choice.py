@@ -100,7 +100,7 @@ def few_samples(table: Array, codings: Sequence[Coding], samples: Samples) -> tu
     _, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     group = group.reshape(-1)
     weights = np.bincount(group, samples.weights).astype(np.float64)
-    shares = 1 / np.bincount(group, 1 / samples.shares)
+    shares = 1 / np.bincount(group, 1 / samples.shares)  # 1 / the number of equal samples
     drawn = np.random.RandomState(0).permutation(len(first))[:MOST_SAMPLES]
     rows = first[drawn]
     return table[rows], Samples(samples.targets[rows], weights[drawn], shares[drawn])
@@ -272,7 +272,7 @@ class InputChoice:
         slopes: Floats = np.ones_like(correlations)
         if n > 1:
             slopes = (n - 1 + 2 * (candidate.total[self._few] - correlations)) / (2 * n * (n - 1))
-        if self._degrees[0] == 2:
+        if self._degrees[0] == 2:  # times the derivative of the polynomial in `apply_degree`
             slopes *= 0.5 + candidate.kernel[self._few]
         elif self._degrees[0] == 3:
             slopes *= 3 * np.square(candidate.kernel[self._few])

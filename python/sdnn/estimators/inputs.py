@@ -95,7 +95,8 @@ class CodedInputs(BaseEstimator):
         In a list, ``coding__0__period`` is a field of the first coding, ``coding__period`` one of
         every coding that has it.
         """
-        fields = {name[8:]: params.pop(name) for name in list(params) if name[:8] == "coding__"}
+        names = [name for name in params if name.startswith("coding__")]
+        fields = {name.removeprefix("coding__"): params.pop(name) for name in names}
         super().set_params(**params)
         if fields:
             self.coding = with_fields(self.coding, fields)
@@ -170,8 +171,8 @@ class CodedInputs(BaseEstimator):
         numbers to be checked with them.
         """
         refuse_dates(X)
-        every = (*(coding for coding, _ in coding_entries(self.coding)), *(codings or ()))
-        numeric = all(coding.is_numeric for coding in every)
+        all_codings = (*(coding for coding, _ in coding_entries(self.coding)), *(codings or ()))
+        numeric = all(coding.is_numeric for coding in all_codings)
         numeric = numeric and (codings is not None or not categorical_columns(X))
         options["reset"] = codings is None
         try:

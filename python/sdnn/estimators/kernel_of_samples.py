@@ -31,6 +31,7 @@ class KernelOfSamples(InputBins):
         self._with_pattern = [i for i, c in enumerate(self.codings) if isinstance(c, WithMissing)]
         tables = tables_of(self.codings) if kernel.has_all_pairs else None
         if tables is not None:
+            # Whether a value is missing is one more input: only missing values are alike.
             tables += [np.diag([0.0, 1.0])] * len(self._with_pattern)
             bins, n_inputs = self._core_bins(samples), len(self.codings)
             self._core = _core.KernelSums(tables, bins, n_inputs, degree)

@@ -214,12 +214,12 @@ class BaseKernelRidge(CodedInputs):
         degrees: Sequence[int],
         table: Array,
         rows: Rows,
-        part: Samples,
+        samples: Samples,
         alpha: float | None,
         *,
         models_errors: bool,
     ) -> tuple[Solution, Solution | None]:
-        """Choose inputs and degree by the errors of models without a sample; ``part`` has the rows.
+        """Choose inputs and degree by leave-one-out errors; ``samples`` are those of the ``rows``.
 
         Returns the solution, and with `models_errors` that of the logarithms of the errors' sizes.
         """
@@ -229,16 +229,16 @@ class BaseKernelRidge(CodedInputs):
             base = kernel(values[rows])
             solutions, models = {}, {}
             for degree in degrees:
-                problem = diagonal(apply_degree(base.copy(), degree), part)
-                solutions[degree] = solve(problem, part, alpha)
+                problem = diagonal(apply_degree(base.copy(), degree), samples)
+                solutions[degree] = solve(problem, samples, alpha)
                 if models_errors:
-                    errors = log_sizes(part.targets - solutions[degree].left_out)
-                    model = solve_for(problem, part, errors)
+                    errors = log_sizes(samples.targets - solutions[degree].left_out)
+                    model = solve_for(problem, samples, errors)
                     models[degree] = dataclasses.replace(model, rows=rows)
                 del problem  # free its memory before the next degree needs as much
             best = min(solutions, key=lambda degree: solutions[degree].error)
-            loss = float(part.weights @ self._losses(part, solutions[best].left_out))
-            if loss < least or inputs is possible[0]:
+            loss = float(samples.weights @ self._losses(samples, solutions[best].left_out))
+            if loss < least or inputs is possible[0]:  # the first ones even if the loss is NaN
                 least, solution, sizes = loss, solutions[best], models.get(best)
                 self._inputs, self.kernel_, self.degree_ = inputs, kernel, best
                 self.X_fit_ = values[rows]
@@ -306,10 +306,11 @@ class SDNNKernelRidge(CodedRegressor, BaseKernelRidge):
         self._sizes_of_errors = sizes
         self.leave_one_out_residuals_ = targets[rows] - left_out
         self._residual_counts = counts[rows]
+        # The model of sizes without a sample, too; those that it was not fitted to, it predicts.
         is_component = np.isin(rows, sizes.rows)
         logarithms = np.empty_like(left_out)
-        places = np.searchsorted(sizes.rows, rows[is_component])
-        logarithms[is_component] = sizes.left_out[places]
+        positions = np.searchsorted(sizes.rows, rows[is_component])
+        logarithms[is_component] = sizes.left_out[positions]
         if not is_component.all():
             others = self._inputs.of(table[rows[~is_component]], self.codings_)
             logarithms[~is_component] = self._log_error_sizes(others)

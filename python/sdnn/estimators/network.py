@@ -201,17 +201,20 @@ class Network:
         return self._online
 
     def expect_few(self, n_samples: int, memory_limit: int) -> None:
-        """Count calls with few samples, and copy the weights into bytes once that saves time."""
+        """Count samples predicted in small calls; make the online layer once that saves time."""
         if self._online is None and n_samples <= FEW_TO_PREDICT:
             if self._n_predicted >= WORTH_BYTES:
                 self.online(memory_limit)
             self._n_predicted += n_samples
 
     def predicts_in_bytes(self, n_samples: int) -> bool:
-        """Return whether the layer for single samples predicts this number of samples faster."""
-        is_behind = self._synchronized is not self._learned
+        """Return whether the online layer predicts this number of samples faster.
+
+        The other layer is faster for many samples, but may have to copy new weights first.
+        """
+        must_copy = self._synchronized is not self._learned
         return self._online is not None and n_samples <= (
-            FEW_SAMPLES if is_behind else FEW_TO_PREDICT
+            FEW_SAMPLES if must_copy else FEW_TO_PREDICT
         )
 
     def learn_online(self, bins: Ints, rule: Rule, memory_limit: int) -> bool:

@@ -279,6 +279,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
             self._widen(targets.min(axis=0))
             self._widen(targets.max(axis=0))
             return self._counts_of_targets(targets)
+        # Targets widen the range one after the other: each batch has the counts of its range.
         begin = 0
         for row in np.flatnonzero(outside.any(axis=1)).tolist():
             counts[begin:row] = self._counts_of_targets(targets[begin:row])

@@ -124,7 +124,7 @@ def low_rank_diagonal(
     gram, sums = np.zeros((len(values), len(values))), np.zeros(len(values))
     kernel_sums = np.zeros(len(components))
     moments = np.zeros((len(values), samples.targets.shape[1]))
-    for rows in row_blocks(n_samples):
+    for rows in row_blocks(n_samples):  # sums over samples, whose features are not all stored
         kernel, weights = kernel_of(rows), samples.weights[rows]
         features = kernel @ to_features
         kernel_sums += weights @ kernel
@@ -136,6 +136,7 @@ def low_rank_diagonal(
     gram -= np.outer(sums, sums) / total
     values, rotation = eigenvectors(gram)
     to_dual = to_features @ rotation
+    # Features of evenly spaced samples suffice for the leave-one-out error.
     rows = np.unique(np.linspace(0, n_samples - 1, MOST_LEFT_OUT).astype(np.int64))
     features = np.concatenate([kernel_of(rows[part]) @ to_dual for part in row_blocks(len(rows))])
     features -= sums @ rotation / total

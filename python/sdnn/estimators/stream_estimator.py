@@ -258,7 +258,7 @@ class StreamEstimator:
         self._follow(codings, self.fitted.codings_, frame)
         self._begin_experts(names)
         n_columns = self.fitted.network_.input_code.core.n_columns
-        self.most_columns = 2 * max(COLUMN_BUDGET, n_columns)
+        self.most_columns = 2 * max(COLUMN_BUDGET, n_columns)  # beyond it `_grow` begins anew
 
     def _begin_experts(self, names: Sequence[str]) -> None:
         """Let the experts beside the network learn the last samples; their weights stay."""
@@ -333,13 +333,13 @@ class StreamEstimator:
             for name, value in x.items()
             if self._is_new(name, value)
         )
-        often = [news for news, count in counts.items() if count >= FEWEST]
+        frequent = [addition for addition, count in counts.items() if count >= FEWEST]
         new: list[str] = []
         if isinstance(self.model.pairs, str):  # a list of pairs cannot name new features
-            new = sorted(name for name, _ in often if name not in self.reads)
+            new = sorted(name for name, _ in frequent if name not in self.reads)
         changed: dict[int, Coding] = {}
         for index, name in enumerate(self.reads):
-            categories = [category for other, category in often if other == name]
+            categories = [category for other, category in frequent if other == name]
             if categories:
                 categories.sort(key=lambda category: (isinstance(category, str), category))
                 coding = self.fitted.codings_[index]

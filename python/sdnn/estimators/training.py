@@ -175,8 +175,8 @@ def epochs_to_present_all(weights: Floats | None) -> int:
     """Return the number of epochs after which every sample with a weight was presented once."""
     if weights is None:
         return 1
-    least = float(np.min(weights, where=weights > 0, initial=1.0))
-    return int(min(np.ceil(1 / least), 2**62))
+    smallest = float(np.min(weights, where=weights > 0, initial=1.0))
+    return int(min(np.ceil(1 / smallest), 2**62))  # 2**62: 1 / smallest may be infinite
 
 
 def most_epochs(max_iter: int | None, n_samples: int) -> int:

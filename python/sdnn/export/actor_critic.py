@@ -92,7 +92,7 @@ class ActorCriticWriter(LinearWriter):
         return self.box is not None
 
     def columns(self) -> NDArray[np.intp]:
-        """Return the places of the header's columns among those of the weights."""
+        """Return which columns of the agent's weights the header has, in the header's order."""
         code = self.code()
         thermometers = code.n_pair_slots + np.arange(code.n_thermometer_columns)
         return np.concatenate([super().columns(), thermometers])

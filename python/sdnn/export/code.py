@@ -28,18 +28,21 @@ class Code:
         self.groups, self.n_double = self._layout()
 
     def _layout(self) -> tuple[list[Pair], int]:
-        """Return the groups (mu, nu) in the order of the code, and the number of paired groups."""
+        """Return the groups (mu, nu), those that are paired first, and the number of these.
+
+        Two paired groups are neighbours. Where an input modifies an odd number of groups, its last
+        one stays alone, behind all pairs.
+        """
         pairs: Sequence[Pair] = self.network.pairs
-        n_partners = len(pairs) // self.n_inputs
-        ranks, n_before = [], dict[int, int]()
+        ranks, n_before = [], dict[int, int]()  # each group's number among those of its modifier
         for _, nu in pairs:
             ranks.append(n_before.get(nu, 0))
             n_before[nu] = ranks[-1] + 1
-        n_taken = n_partners // 2 * 2
+        n_paired = len(pairs) // self.n_inputs // 2 * 2  # of each modifier
         order = sorted(
-            range(len(pairs)), key=lambda g: (ranks[g] >= n_taken, pairs[g][1], ranks[g])
+            range(len(pairs)), key=lambda g: (ranks[g] >= n_paired, pairs[g][1], ranks[g])
         )
-        return [pairs[g] for g in order], n_taken * self.n_inputs
+        return [pairs[g] for g in order], n_paired * self.n_inputs
 
     @property
     def n_columns(self) -> int:
@@ -54,6 +57,7 @@ class Code:
     @property
     def most_columns(self) -> int:
         """Largest number of columns that are not 0 for a state."""
+        # Two paired groups together have as many columns that are not 0 as a single one.
         n_ones = [int((self.network.table(i) > 0).sum(axis=1).max()) for i in range(self.n_inputs)]
         modifiers = [*self.groups[: self.n_double : 2], *self.groups[self.n_double :]]
         return sum(n_ones[nu] for _, nu in modifiers)
@@ -78,44 +82,38 @@ class Code:
         patterns = [
             np.packbits(self.network.table(i) > 0, axis=1, bitorder="little") for i in inputs
         ]
-        parts = {
+        arrays = {
             "patterns": ("uint8_t", np.concatenate(patterns).reshape(-1)),
             "modified": ("uint16_t", np.array([mu for mu, _ in self.groups])),
             "modifiers": ("uint16_t", np.array([nu for _, nu in self.groups])),
             "units": ("uint8_t" if self.m <= 256 else "uint16_t", np.concatenate(self.units)),
         }
-        for part, (kind, values) in parts.items():
-            tables.add(kind, f"{part}{ending}", values)
-        return [f"{part}{ending}" for part in parts]
+        for name, (c_type, values) in arrays.items():
+            tables.add(c_type, f"{name}{ending}", values)
+        return [f"{name}{ending}" for name in arrays]
 
     def paired(self, weights: NDArray[np.int32]) -> NDArray[np.int32]:
         """Convert weights (n, D) from the paper's order to the paired columns."""
         rows = weights[:, self._order()].reshape(len(weights), len(self.groups), self.m)
         first, second = rows[:, : self.n_double : 2], rows[:, 1 : self.n_double : 2]
-        rows[:, : self.n_double : 2], rows[:, 1 : self.n_double : 2] = (
-            first + second,
-            first - second,
-        )
+        first[:], second[:] = first + second, first - second
         return rows.reshape(len(weights), -1)
 
     def unpaired(self, columns: NDArray[np.int32]) -> NDArray[np.int32]:
         """Convert paired columns back to weights; ValueError for impossible sums or differences."""
         rows = columns.reshape(len(columns), len(self.groups), self.m).copy()
         first, second = rows[:, : self.n_double : 2], rows[:, 1 : self.n_double : 2]
-        if ((first ^ second) & 1).any():
+        if ((first ^ second) & 1).any():  # a sum and a difference are both even or both odd
             raise ValueError("weights are no sums and differences")
-        rows[:, : self.n_double : 2], rows[:, 1 : self.n_double : 2] = (
-            (first + second) // 2,
-            (first - second) // 2,
-        )
+        first[:], second[:] = (first + second) // 2, (first - second) // 2
         weights = np.empty_like(columns)
         weights[:, self._order()] = rows.reshape(len(columns), -1)
         return weights
 
     def _order(self) -> NDArray[np.intp]:
         """Return the index of each column in the paper's order."""
-        places = {pair: g for g, pair in enumerate(self.network.pairs)}
-        starts = [places[group] * self.m for group in self.groups]
+        numbers = {pair: number for number, pair in enumerate(self.network.pairs)}
+        starts = [numbers[group] * self.m for group in self.groups]
         return np.concatenate(
             [start + units for start, units in zip(starts, self.units, strict=True)]
         )

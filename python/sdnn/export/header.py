@@ -156,6 +156,7 @@ def load_image(agent: SDNNQLearning | SDNNQLambda | SDNNActorCritic, image: byte
     writer = writer_of(agent, "agent", None, learns=True)
     is_bytes = isinstance(image, bytes | bytearray | memoryview)
     require(is_bytes, "image", "be bytes", image, TypeError)
+    # An image begins with 8 bytes that identify the agent, and ends with a checksum of 4.
     whole, expected = bytes(image), writer.image()
     if len(whole) != len(expected):
         raise ValueError(f"image must have {len(expected)} bytes, got {len(whole)}")

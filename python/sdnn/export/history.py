@@ -174,10 +174,10 @@ class StateHistory:
     def _part_sizes(self) -> list[int]:
         """Return the numbers of variables that are missing together."""
         sizes = {first: size for first, size in self.agent._observation.symbols}
-        parts, at = list[int](), 0
-        while at < len(self.agent.observation_range[0]):
-            parts.append(sizes.get(at, 1))
-            at += parts[-1]
+        parts, variable = list[int](), 0
+        while variable < len(self.agent.observation_range[0]):
+            parts.append(sizes.get(variable, 1))  # a symbol has several variables
+            variable += parts[-1]
         return parts
 
     def usage(self) -> Iterator[str]:

@@ -60,7 +60,7 @@ class Learner(Writer[Network]):
         return np.dtype([*head, *self.fields()])
 
     def state(self) -> Data:
-        """Return the core's state, and the scale of rewards, with all of its numbers."""
+        """Return the core's state and the scale of rewards; numbers not known yet are `NONE`."""
         scale = {"size": NONE, "size_in_window": NONE, **self.agent._state_of("reward_scale")}
         state = self.agent._state_of("agent")
         return state | {f"{SCALE}.{name}": number for name, number in scale.items()}

@@ -27,7 +27,7 @@ class LinearWriter(Writer[_core.LinearSDNN]):
         return Code(self.network, self.n_inputs)
 
     def columns(self) -> NDArray[np.intp]:
-        """Return the places of the header's columns among those of the weights."""
+        """Return which columns of the agent's weights the header has, in its order."""
         m = self.agent.approximator.n_pattern_units
         n_groups = len(self.network.pairs)
         slots = np.arange(n_groups)[:, None] * rounded_up(m, 64) + np.arange(m)
@@ -95,7 +95,7 @@ class LinearWriter(Writer[_core.LinearSDNN]):
         return {f"{macro}_FIRST": round(first * _ONE), f"{macro}_LAST": round(last * _ONE)}
 
     def with_states(self, n_bytes: int, plain_bytes: int, *, next_bins: bool) -> int:
-        """Add the bytes of the last states to those of the fields before them.
+        """Add the bytes of the last states, with their history, to those of the fields before them.
 
         Without a history they have ``plain_bytes``; with one they begin at a multiple of 8 bytes.
         """

@@ -37,7 +37,7 @@ class SDNNCWriter(Writer[_core.SDNNC]):
         require_few_weights(self.n_dimensions * n_units * n_columns, "n_hidden_units")
 
     def units(self, network: _core.SDNNC) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Return the hidden units of all windows, and the position of each window's first unit."""
+        """Return the hidden units that some action's window has, and where each window begins."""
         first = network.first_units().astype(np.intp)
         used = np.unique(first[:, None] + np.arange(self.agent.approximator.n_active_units))
         return used, np.searchsorted(used, first)
@@ -145,7 +145,7 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
         self._check_values()
         self.n_words = self.n_units // 4 * self.code.n_columns
         self.horizon = int(2.0 / max(1.0 - agent.learning.discount, 0.004))
-        """Number of rewards of a return; see cpp/include/sdnn/agents/return_range.hpp."""
+        """Number of rewards of a return, at most 500; see `sdnn/agents/return_range.hpp`."""
         self.adapts = agent.learning.value_range == "adaptive"
 
     def _check_settings(self) -> None:
@@ -403,6 +403,6 @@ def _seeded(seed: int, stream: int) -> list[int]:
         z = (z ^ z >> 27) * 0x94D049BB133111EB & _WORD
         return z ^ z >> 31
 
-    mixed = split_mix() ^ stream
+    mixed = split_mix() ^ stream  # so that streams of a seed differ
     mixed = split_mix()
     return [split_mix() for _ in range(4)]

@@ -213,7 +213,7 @@ def c_strings(name: str, words: Iterable[str]) -> list[str]:
     };
     """
     quoted = [
-        "".join(
+        "".join(  # printable ASCII stays except ", ? and \\; other bytes are octal escapes
             chr(byte) if 31 < byte < 127 and chr(byte) not in '"?\\' else f"\\{byte:03o}"
             for byte in word.encode("utf-8", "backslashreplace")
         )

@@ -119,19 +119,19 @@ class Writer(ABC, Generic[Network]):
         if self.box is not None:
             numbers += np.abs(self.box.astype(np.float64)).reshape(-1).tolist()
         largest = max(numbers, default=0.0)
-        most = next(
+        most_bits = next(
             (b for b in range(MOST_FRACTION_BITS, -1, -1) if math.ceil(largest * 2**b) < 2**31), -1
         )
-        if most < 0:
+        if most_bits < 0:
             raise ValueError(
                 "observation ranges and actions must be below 2^31 in a C header,"
                 f" got {largest:g}: scale them"
             )
         if given is None:
-            return min(most, _DEFAULT_FRACTION_BITS)
+            return min(most_bits, _DEFAULT_FRACTION_BITS)
         bits = whole("fraction_bits", given, 0, MOST_FRACTION_BITS)
-        if bits > most:
-            problem = f"must be at most {most}, so that {largest:g} fits 32 bits, got {bits}"
+        if bits > most_bits:
+            problem = f"must be at most {most_bits}, so that {largest:g} fits 32 bits, got {bits}"
             raise argument_error("fraction_bits", problem)
         return bits
 

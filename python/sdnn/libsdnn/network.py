@@ -182,7 +182,7 @@ def number_of(text: str, what: str) -> float:
         raise ValueError
 
     errors = ArithmeticError, LookupError, MemoryError, RecursionError, TypeError, ValueError
-    with suppress(SyntaxError, *errors):
+    with suppress(SyntaxError, *errors):  # a formula of more than 1,000 characters is refused
         result = value(ast.parse(text[:1001].replace("^", "**"), mode="eval").body)
         if len(text) <= 1000 and np.isfinite(result):
             return result
@@ -224,6 +224,7 @@ class Entries(dict[str, str]):
     """The entries of a parameter file by full names, such as ``SDNN/PC/n``."""
 
     def __init__(self, text: str, path: Path) -> None:
+        """Read lines ``name = value`` between ``<tag> {`` and ``}``; ``%`` begins a comment."""
         self.path = path
         tags: list[str] = []
         for number, line in enumerate(text.splitlines(), start=1):
@@ -318,6 +319,7 @@ def read_model_file(
                 f"it needs {n_bins * parameters.n_units} bytes for {n_bins} patterns of"
                 f" {parameters.n_units} units, more than memory_limit={memory_limit}"
             )
+        # Each unit has a row of 32-bit numbers: its threshold, then its weights.
         rows = np.frombuffer(content, "<i4", offset=4 + length).reshape(n_units, n_columns + 1)
         try:
             layer = _core.ParallelPerceptron(

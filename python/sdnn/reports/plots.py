@@ -88,7 +88,7 @@ def label(figure: Figure, title: str, below: str, footer: str, color: str = FAIN
     from matplotlib.text import Text
 
     figure.suptitle(f"{title}\n", x=0.012, ha="left", fontsize=12, color=INK)
-    y = 1 - 0.32 / figure.get_figheight()
+    y = 1 - 0.32 / figure.get_figheight()  # 0.32 inches below the top
     figure.text(0.012, y, below, fontsize=8.5, va="top", color=color)
     figure.supxlabel(footer, x=0.012, ha="left", fontsize=6.5, color=FAINT, linespacing=1.4)
     for text in figure.findobj(Text):

@@ -62,6 +62,7 @@ class Experiment:
     def with_agents(self, agents: Iterable[str], presets: Iterable[str] = ()) -> Experiment:
         """Return the experiment with other agents, if any, and additional presets of SDNN-C."""
         chosen = tuple(agents)
+        # Without a suffix the agent's preset is that of the paper.
         names = [f"sdnn-c-{name}".removesuffix("-paper") for name in presets]
         cases = (
             replace(case, agents=tuple(dict.fromkeys((*(chosen or case.agents), *names))))

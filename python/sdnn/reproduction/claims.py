@@ -240,15 +240,16 @@ def judge_claims(
     results, if these contain all of its checks.
     """
     by_subject = {(result.case_id, result.agent): result for result in measured}
-    more = {(result.case_id, result.agent): result for result in reference}
-    draws = TenTrials(more.values())
+    with_more_trials = {(result.case_id, result.agent): result for result in reference}
+    draws = TenTrials(with_more_trials.values())
     outcomes = []
     for claim in CLAIMS:
         checks = tuple(_judge_check(check, by_subject, costs) for check in claim.checks)
         outcome = ClaimOutcome(claim, checks)
-        better = ClaimOutcome(claim, tuple(_judge_check(check, more, ()) for check in claim.checks))
-        if better.verdict is not Verdict.NOT_RUN:
-            outcome = replace(outcome, more=better, chance=draws.chance(claim))
+        checks = tuple(_judge_check(check, with_more_trials, ()) for check in claim.checks)
+        by_reference = ClaimOutcome(claim, checks)
+        if by_reference.verdict is not Verdict.NOT_RUN:
+            outcome = replace(outcome, more=by_reference, chance=draws.chance(claim))
         outcomes.append(outcome)
     return tuple(o for o in outcomes if any(check.estimate is not None for check in o.checks))
 

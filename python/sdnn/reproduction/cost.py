@@ -176,15 +176,16 @@ def measure_steps(
         agent = series.core_agent(approximator=approximator, learning=entry.learning(), seed=SEED)
     except MemoryError:
         return None
-    first = _core.time_agent_steps(agent, 1, SEED)
+    first = _core.time_agent_steps(agent, 1, SEED)  # nanoseconds
     step_seconds = float(first[0]) / 1e9
     in_a_round = int(config.round_seconds / step_seconds)
+    # Steps before the measurement fill the agent's memory, and are a better estimate of the time.
     n_learned = min(config.n_learned, in_a_round)
     learning = _core.time_agent_steps(agent, n_learned, SEED + 1)
     if n_learned:
         in_a_round = int(config.round_seconds * 1e9 / float(np.median(learning)))
     table_bytes = entry.table_bytes(approximator) if entry.table_bytes else 0
-    if in_a_round <= 1:
+    if in_a_round <= 1:  # steps so slow that each is a round, as many as time allows
         n_slow = min(config.n_slow_rounds, int(config.slow_seconds / step_seconds))
         slow = _core.time_agent_steps(agent, n_slow, SEED + 2) if n_slow else first
         return tuple((slow / 1e3).tolist()), 1, table_bytes

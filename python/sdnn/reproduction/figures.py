@@ -51,10 +51,10 @@ def draw_experiment(
     panels = figure.subplots(n_rows, n_columns, sharey=True, squeeze=False).ravel()
     colors = agent_colors(result.agent for result in results)
     for number, (case, axes) in enumerate(zip(experiment.cases, panels, strict=False)):
-        shown = [result for result in results if result.case_id == case.id]
+        of_case = [result for result in results if result.case_id == case.id]
         axes.set_title(case.title, fontsize=10.5, loc="left", color=INK)
         axes.set_title(f"paper: {case.paper_figure}", fontsize=8, loc="right", color=FAINT)
-        draw_steps(axes, shown, colors, smooth=is_long)
+        draw_steps(axes, of_case, colors, smooth=is_long)
         axes.set_ylim(0, MAX_STEPS)
         if number % n_columns == 0:
             axes.set_ylabel("steps per test episode")
@@ -89,7 +89,7 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False, narrow: bool 
     """
     figure = new_figure(NARROW_WIDTH, 6.2) if narrow else new_figure(9.4, 4.7)
     axes = figure.add_subplot()
-    colors = [color_of(place) for place in range(len(SERIES))]
+    colors = [color_of(number) for number in range(len(SERIES))]
     for number, series in enumerate(SERIES):
         series_costs = sorted((c for c in costs if c.series == series.id), key=lambda c: c.n_inputs)
         if not series_costs:
@@ -105,7 +105,7 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False, narrow: bool 
         )  # fmt: skip
         if series.id == "sdnn-c" and 4 in x:
             fine = np.linspace(x[0], x[-1], 100)
-            scale = middle[x.index(4)] / (4 * 3)
+            scale = middle[x.index(4)] / (4 * 3)  # d inputs have d (d - 1) pairs
             axes.plot(
                 fine, scale * fine * (fine - 1), ":", color=colors[number], linewidth=1.2,
                 label="proportional to $d(d-1)$",
@@ -157,17 +157,15 @@ def _label(
     scale = f"{trials} {'trial' if trials == '1' else 'trials'} x {n_episodes:,} episodes"
     below = ""
     if quick or fewest < PAPER_TRIALS or n_episodes < PAPER_EPISODES:
-        what = "QUICK LOOK, not the result" if quick else "smaller than the paper's experiment"
-        below = f"{what}: {scale} instead of {PAPER_TRIALS} x {PAPER_EPISODES:,}"
+        warning = "QUICK LOOK, not the result" if quick else "smaller than the paper's experiment"
+        below = f"{warning}: {scale} instead of {PAPER_TRIALS} x {PAPER_EPISODES:,}"
     hashes = [f"{r.case_id}/{r.agent} {r.config_hash[:8]}" for r in results]
     lines = [", ".join(hashes[i : i + 4]) for i in range(0, len(hashes), 4)]
-    lines_are = "Line: median over trials; band: quartiles."
+    legend = "Line: median over trials; band: quartiles."
     if smooth:
-        lines_are = (
-            "Thin line: median over trials; thick line and band: its running median and that"
-        )
-        lines_are += f" of the quartiles over {SMOOTHED_TESTS} tests."
+        legend = "Thin line: median over trials; thick line and band: its running median and that"
+        legend += f" of the quartiles over {SMOOTHED_TESTS} tests."
     versions = ", ".join(sorted({record.version for r in results for record in r.records}))
-    footer = f"{lines_are} {scale} per case and agent.\nsdnn {versions}; configuration "
+    footer = f"{legend} {scale} per case and agent.\nsdnn {versions}; configuration "
     footer += ",\n".join(lines)
     label(figure, title, below, wrapped(footer) if narrow else footer, _WARNING_COLOR)

@@ -91,7 +91,7 @@ class PaperStudy(Study):
     ) -> None:
         defaults = (QUICK_TRIALS, QUICK_EPISODES) if quick else (PAPER_TRIALS, PAPER_EPISODES)
         trials, episodes = n_trials or defaults[0], n_episodes or defaults[1]
-        asked = {experiment.id for experiment in select_experiments(word)}
+        requested = {experiment.id for experiment in select_experiments(word)}
         self.quick, self.agents, presets = quick, dict.fromkeys(agents), dict.fromkeys(presets)
         experiments: tuple[Experiment, ...] = EXPERIMENTS
         has_sensors = sensors is not None or noise is not None
@@ -103,13 +103,13 @@ class PaperStudy(Study):
         cases = [case for experiment in self.experiments for case in experiment.cases]
         whole("episodes", episodes, PAPER_INTERVAL, MOST_EPISODES)
         super().__init__("", specs_of(cases, episodes), n_trials=trials, seed=seed)
-        wanted = {
+        requested_pairs = {
             pair
             for experiment in self.experiments
-            if experiment.id in asked
+            if experiment.id in requested
             for pair in experiment.pairs
         }
-        self.pairs = tuple(pair for pair in self.combinations if pair in wanted)
+        self.pairs = tuple(pair for pair in self.combinations if pair in requested_pairs)
         self.cost_config = cost.QUICK_COST if quick else CostConfig()
         self.costs = {}
         if word in (COST, "all"):
@@ -159,10 +159,10 @@ class PaperStudy(Study):
         stored = comparison.measured.keys()
         collected = [(e, collect(e, comparison)) for e in self.experiments if e.pairs <= stored]
         stored_costs = cost.load_costs(store, self.cost_config.config_hash)
-        shown = {series.id for series in cost.cost_series(self.agents or None)}
+        series_ids = {series.id for series in cost.cost_series(self.agents or None)}
         report = Report(
             experiments=tuple(collected),
-            costs=tuple(cost for cost in stored_costs if cost.series in shown),
+            costs=tuple(cost for cost in stored_costs if cost.series in series_ids),
             quick=self.quick,
             seed=self.seed,
             agents=tuple(self.agents),
@@ -260,7 +260,7 @@ def case_spec(case: Case, agent: str, n_episodes: int = PAPER_EPISODES) -> RunSp
     Raises ValueError if the agent takes no part in the case, or if there is no such agent.
     """
     one_of("agent", agent, case.agents)
-    split_label(agent)
+    split_label(agent)  # raises for an unknown agent
     episodes = whole("episodes", n_episodes, 1, 2**53)
     settings = {**case.settings, "agent.name": agent, "budget.episodes": episodes}
     return paper_spec(**overridden({}, settings))

@@ -75,7 +75,9 @@ class ConfigFile:
     def located(self, error: ConfigError, options: Collection[str] = ()) -> ConfigError:
         """Add file and line to an error, unless a command-line option has set its key."""
         key = tuple(error.key.partition("[")[0].split("."))
+        # A table that the file lacks can only come from options.
         for name in (error.key, key[0] if key[0] not in self.values else error.key):
+            # An option for the key, for a table that holds it, or for a key within it.
             if any(f"{name}.".startswith(f"{o}.") or o.startswith(f"{name}.") for o in options):
                 return error
         return error if error.place else ConfigError(error.key, error.problem, self.place(key))
@@ -126,7 +128,7 @@ def spec_schema() -> Values:
     """
     parts = core_parts()
     configs = [config for configs in parts.values() for config in configs]
-    structs = [
+    structs = [  # the core's classes as msgspec's, for its JSON Schema
         msgspec.defstruct(
             config.__name__,
             [
@@ -145,10 +147,11 @@ def spec_schema() -> Values:
             *({"$ref": f"#/$defs/{kind.__name__}"} for kind in core),
             {"type": "object"},  # settings of an agent that a user has registered
         ]
+    # Arguments of the paper's acrobot, in the schema of its environment alone.
     arguments = {name: {"$ref": f"#/$defs/{c.__name__}"} for name, c in PAPER_ARGUMENTS.items()}
     components["EnvironmentSpec"]["if"] = {"properties": {"id": {"const": PAPER_ACROBOT}}}
     components["EnvironmentSpec"]["then"] = {"properties": {"kwargs": {"properties": arguments}}}
-    for table in ("environment", "agent"):
+    for table in ("environment", "agent"):  # which a text may replace: its id or name
         inner = {
             name: properties[table].pop(name)
             for name in ("anyOf", "$ref")

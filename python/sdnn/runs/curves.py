@@ -69,17 +69,19 @@ def groups_of(runs: Sequence[Run]) -> list[Group]:
         }
         members.setdefault(tuple(sorted(settings.items())), []).append(run)
     groups = []
-    for key_values, same in members.items():
-        spec = same[0].spec
+    for key_values, group_runs in members.items():
+        spec = group_runs[0].spec
         task, agent = [spec.task], [f"{spec.agent.name} {spec.agent.preset or ''}".strip()]
-        alike = [(dict(s), r[0].spec) for s, r in members.items() if r[0].spec.task == spec.task]
-        for key, value in key_values:
+        same_task = [
+            (dict(s), r[0].spec) for s, r in members.items() if r[0].spec.task == spec.task
+        ]
+        for key, value in key_values:  # a label has the settings in which other groups differ
             is_of_task = key.startswith("environment.")
-            others = (s for s, other in alike if is_of_task or other.label == spec.label)
+            others = (s for s, other in same_task if is_of_task or other.label == spec.label)
             if any(other.get(key) != value for other in others):
                 word = value if key == "goals" else f"{key.rpartition('.')[2]}={value}"
                 (task if is_of_task else agent).append(word)
-        groups.append(Group(task=", ".join(task), agent=", ".join(agent), runs=tuple(same)))
+        groups.append(Group(task=", ".join(task), agent=", ".join(agent), runs=tuple(group_runs)))
     return groups
 
 
@@ -295,7 +297,7 @@ def draw_curves(curves: Sequence[Curve], levels: Sequence[Level] = ()) -> Figure
     require_matplotlib()
     tasks = list(dict.fromkeys(curve.task for curve in curves))
     agents = list(dict.fromkeys(curve.agent for curve in curves))
-    colors = {agent: color_of(place) for place, agent in enumerate(agents)}
+    colors = {agent: color_of(number) for number, agent in enumerate(agents)}
     figure = new_figure(_WIDTH, 0.9 + 3.3 * len(tasks))
     panels = figure.subplots(len(tasks), squeeze=False)[:, 0]
     for task, axes in zip(tasks, panels, strict=True):

@@ -304,7 +304,7 @@ def _run_in_chunks(trial: Trial | TrainingTrial | Team) -> Generator[None, None,
     if isinstance(trial, TrainingTrial):  # its episodes may be longer than a chunk
         yield from trial.training.pieces(CHUNK_SECONDS)
         return
-    chunk = 1
+    chunk = 1  # episodes, adapted to their duration
     while not trial.finished:
         begin = time.monotonic()
         trial.advance(chunk)

@@ -82,15 +82,16 @@ def draw_study(comparison: Comparison, footer: str, *, narrow: bool = False) -> 
     cases = comparison.cases
     n_columns = 1 if narrow else min(len(cases), CASES_PER_ROW)
     n_rows = 2 * -(-len(cases) // n_columns)
-    names = 0.3 + 0.072 * max(len(variant.title) for variant in comparison.variants)
-    width = NARROW_WIDTH if narrow else max(6.4, names + n_columns * _PANEL_WIDTH)
+    # Inches that the titles of variants take at the left.
+    title_width = 0.3 + 0.072 * max(len(variant.title) for variant in comparison.variants)
+    width = NARROW_WIDTH if narrow else max(6.4, title_width + n_columns * _PANEL_WIDTH)
     panel_height = 1.0 + _LINE_HEIGHT * len(comparison.variants)
     figure = new_figure(width, 1.2 + n_rows * panel_height)
     grid = figure.subplots(n_rows, n_columns, squeeze=False)
     for axes in grid.ravel():
         axes.set_visible(False)
-    for place, case in enumerate(cases):
-        row, column = divmod(place, n_columns)
+    for number, case in enumerate(cases):
+        row, column = divmod(number, n_columns)
         pair = grid[2 * row : 2 * row + 2, column]
         _draw_case(pair, comparison, case.id, with_names=column == 0)
         pair[0].set_title(case.title, fontsize=9, loc="left", color=INK)
@@ -173,7 +174,7 @@ def _label_case(axes: Axes, name: MeasureName, last: int) -> None:
     axes.set_xlabel(_TITLES[name], fontsize=8, color=INK)
     axes.xaxis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 2.5, 5, 10]))
     if name == "final_share_solved":
-        axes.set_xlim(-3, 103)
+        axes.set_xlim(-3, 103)  # percent, with a margin for dots at the limits
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g} %"))
     elif name == "episode_of_collapse":
         axes.set_xlim(-0.03 * last, 1.03 * last)

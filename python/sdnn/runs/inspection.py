@@ -197,11 +197,11 @@ class Inspection:
                 )
             )
         header = ("input", "type", "range", "met", "used", "outside", "values", "actions", "note")
-        shown = [i for i in range(len(header)) if any(row[i] for row in rows)]
+        not_empty = [i for i in range(len(header)) if any(row[i] for row in rows)]
         return Table(
             "Inputs",
-            tuple(header[i] for i in shown),
-            [tuple(row[i] for i in shown) for row in rows],
+            tuple(header[i] for i in not_empty),
+            [tuple(row[i] for i in not_empty) for row in rows],
             brief=("input", "met", "values", "actions", "note"),
         )
 
@@ -269,7 +269,7 @@ class Inspection:
         evaluations = [row["mean_return"] for row in self.rows if row["kind"] == "evaluation"]
         if len(evaluations) > 2:
             last, best, worst = evaluations[-1], max(evaluations), min(evaluations)
-            if best - last > 0.5 * (best - worst) > 0.0:
+            if best - last > 0.5 * (best - worst) > 0.0:  # lost half of the improvement
                 texts.append(
                     f"The last evaluation ({last:.5g}) is far below the best one ({best:.5g}):"
                     " --keep-best keeps that agent."

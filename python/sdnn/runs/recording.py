@@ -61,7 +61,7 @@ def record(
     root = run.fresh_seed if seed is None else seed
     recording = Recording(agent.is_warming_up)
     env = run.spec.make_env("evaluation_sensor_noise", render_mode="rgb_array")
-    if "rgb_array_list" in render_modes(env):
+    if "rgb_array_list" in render_modes(env):  # several pictures a step: smoother motion
         env.close()
         env = run.spec.make_env("evaluation_sensor_noise", render_mode="rgb_array_list")
     with closing(env):

@@ -124,10 +124,10 @@ def format_estimate(
         return "-"
     scale, unit = (100, " %") if measure == "final_share_solved" else (1, "")
     decimals = 1
-    ends = np.array([estimate.value, estimate.lower, estimate.upper])
-    ends = ends[np.isfinite(ends)]
-    if measure in RETURN_MEASURES and ends.any():
-        extent = float(np.ptp(ends)) or float(np.abs(ends).max()) / 100
+    numbers = np.array([estimate.value, estimate.lower, estimate.upper])
+    numbers = numbers[np.isfinite(numbers)]
+    if measure in RETURN_MEASURES and numbers.any():  # two digits of the interval's extent
+        extent = float(np.ptp(numbers)) or float(np.abs(numbers).max()) / 100
         decimals = min(max(1, 1 - math.floor(math.log10(extent))), 300)
 
     def number(value: float) -> str:

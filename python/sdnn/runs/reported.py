@@ -63,9 +63,9 @@ class Consent:
         if module in _TRUSTED_MODULES:
             return
         trusted = _TRUSTED
-        if module:
+        if module:  # an id "module:Env-v0" imports that module, whatever is registered
             trusted = frozenset()
-        else:
+        else:  # the package of a registered environment's class
             registered = gym.registry.get(environment_id)
             entry_point = registered.entry_point if registered else None
             if isinstance(entry_point, str):
@@ -178,8 +178,9 @@ class ReportedTrial:
             raise ConfigError("goals", problem)
         if spec.budget.target_return is not None or goal is not None:
             return
-        every = protocol.evaluate_every if unit == "steps" else protocol.evaluate_every_episodes
-        n_evaluations = spec.length // every if every else 0
+        by_steps, by_episodes = protocol.evaluate_every, protocol.evaluate_every_episodes
+        interval = by_steps if unit == "steps" else by_episodes
+        n_evaluations = spec.length // interval if interval else 0
         n_evaluated = n_evaluations * protocol.evaluation_episodes
         for key, needed in (
             (f"budget.{unit}", spec.length),

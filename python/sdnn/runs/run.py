@@ -173,11 +173,11 @@ class Run(Displayed):
             remove_abandoned_files(self.folder)
             if (self.folder / AGENT).exists() and not (self.folder / CHECKPOINT).exists():
                 missing = f"{self.folder} was trained, but has no {CHECKPOINT} to resume from"
-                way = f"a new run needs another folder, {AGENT} would be written over"
-                raise RunError(f"{missing}: {way}")
+                remedy = f"a new run needs another folder, {AGENT} would be written over"
+                raise RunError(f"{missing}: {remedy}")
             store = stack.enter_context(ResultStore(self.folder))
-            begun = store.keys(unfinished=True)
-            if begun and self.key not in begun:
+            stored = store.keys(unfinished=True)
+            if stored and self.key not in stored:
                 raise RunError(
                     f"{self.folder / CONFIG} differs from the specification in {STORE_NAME}: undo"
                     " the edit, or begin a new run with --config and another --out"

@@ -155,8 +155,8 @@ def _expected_value(possible: Iterable[object], text: str) -> str:
     """Return "must be ..." for one of the possible types, from the text of msgspec's error."""
     choices = [repr(w) for form in possible if get_origin(form) is Literal for w in get_args(form)]
     if choices:
-        others = " or an array" if any(get_origin(form) is tuple for form in possible) else ""
-        return f"must be one of {', '.join(choices)}{others}"
+        or_array = " or an array" if any(get_origin(form) is tuple for form in possible) else ""
+        return f"must be one of {', '.join(choices)}{or_array}"
     expected = text.partition(", got")[0].replace("Object missing required field", "a table with")
     for name, word in _WORDS.items():
         expected = expected.replace(name, word)
@@ -431,7 +431,7 @@ def overridden(values: Mapping[str, object], options: Mapping[str, object]) -> V
     for name, key in SHORTHANDS.items():
         if isinstance(settings.get(name), str):
             settings[name] = {key: settings[name]}
-    for key in options:
+    for key in options:  # remove keys of the file that conflict with an option
         table, _, name = _REPLACED.get(key, "").partition(".")
         if isinstance(settings.get(table), dict):
             settings[table].pop(name, None)

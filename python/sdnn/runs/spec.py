@@ -135,14 +135,14 @@ class RunSpec(Settings, frozen=True):
         """Return the agent's entry and preset; a name such as ``"sdnn-c-robust"`` has both."""
         label, preset = self.agent.name or DEFAULT_AGENT, self.agent.preset
         try:
-            name, named = split_label(label)
+            name, preset_in_label = split_label(label)
         except ValueError as error:
             if not self.environment.imported():
                 raise ConfigError("agent.name", blamed(error)[1]) from None
             return self._chosen_agent()  # the environment's module may have registered the agent
-        if named is not None and preset not in (None, named):
+        if preset_in_label is not None and preset not in (None, preset_in_label):
             raise ConfigError("agent.preset", f"must be that of {label!r}, got {shown(preset)}")
-        return agent_entry(name), named or preset
+        return agent_entry(name), preset_in_label or preset
 
     def _fill_protocol(self) -> None:
         """Set protocol and budget where not given; ConfigError if settings do not go together."""

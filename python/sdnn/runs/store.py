@@ -123,11 +123,11 @@ class ResultStore(AbstractContextManager["ResultStore"]):
             recovered = on_error.enter_context(closing(connect(None)))
             for path in (self.path, journal):
                 shutil.copyfile(path, Path(folder, path.name))
-            place = Path(folder, self.path.name)
+            copy = Path(folder, self.path.name)
             try:
-                with closing(connect(place)) as connection:
+                with closing(connect(copy)) as connection:  # rolls the transaction back
                     connection.backup(recovered)
-                is_lost = _inspect(place) and has_rows(self.path)
+                is_lost = _inspect(copy) and has_rows(self.path)
             except (sqlite3.DatabaseError, StoreError) as error:
                 raise foreign_journal(journal) from error
             if is_lost:

@@ -148,9 +148,9 @@ class StudyFile(Study):
             raise self.file.error(("study", "reference"), problem)
         variants = tuple(sorted(variants, key=lambda variant: variant.id != reference))
         pairs = [
-            pair
-            for pair in itertools.product(cases, variants)
-            if pair[0].id in (pair[1].only or [pair[0].id])
+            (case, variant)
+            for case, variant in itertools.product(cases, variants)
+            if not variant.only or case.id in variant.only
         ]
         if len(pairs) > MOST_COMBINATIONS:
             problem = f"must be at most {MOST_COMBINATIONS} in all cases, got {len(pairs)}"
@@ -317,16 +317,16 @@ class StudyFile(Study):
         """Return the variants of ``[variants.NAME]``, then those of the axes."""
         variants: dict[str, StudyVariant] = {}
         known = [case.id for case in cases]
-        for name, given in self.tables.variants.items():
-            where, table = ("variants", name), dict(given)
-            of_cases = dotted((*where, "cases"))
-            tables = convert_value(dict[str, _Table], table.pop("cases", {}), of_cases)
+        for name, values in self.tables.variants.items():
+            where, table = ("variants", name), dict(values)
+            key_of_cases = dotted((*where, "cases"))
+            tables = convert_value(dict[str, _Table], table.pop("cases", {}), key_of_cases)
             only = convert_value(tuple[str, ...], table.pop("only", ()), dotted((*where, "only")))
             for number, case_id in enumerate(only):
                 if case_id not in known:
                     problem = f"no case {case_id!r}; {advice(case_id, known)}"
                     raise self.file.error((*where, "only", number), problem)
-            check_names(tables, only or known, of_cases)
+            check_names(tables, only or known, key_of_cases)
             in_cases = {
                 case_id: self._layer((*where, "cases", case_id), table_of_case)
                 for case_id, table_of_case in tables.items()
@@ -349,32 +349,32 @@ class StudyFile(Study):
         axes = self._layer(("axes",), table)
         if not axes:
             return
-        lasts = Counter(name[-1] for name in axes)
-        values = [list(self._axis_values(axes[name], name, lasts)) for name in axes]
+        counts = Counter(name[-1] for name in axes)  # a last name of several axes is ambiguous
+        values = [list(self._axis_values(axes[name], name, counts)) for name in axes]
         if combine == "product":
             if math.prod(map(len, values)) > MOST_COMBINATIONS:
                 problem = f"must give at most {MOST_COMBINATIONS} combinations"
                 raise self.file.error(("axes", "combine"), problem)
             for chosen in itertools.product(*values):
-                layer = {name: setting for _, part in chosen for name, setting in part.items()}
-                label = ", ".join(word for word, _ in chosen)
+                layer = {name: setting for _, axis in chosen for name, setting in axis.items()}
+                label = ", ".join(axis_label for axis_label, _ in chosen)
                 yield StudyVariant(label, label, layer, ("axes",))
             return
         yield StudyVariant(BASE, BASE, {}, ("axes",))
-        for word, layer in itertools.chain.from_iterable(values):
+        for label, layer in itertools.chain.from_iterable(values):
             (setting,) = layer.values()
-            yield StudyVariant(word, word, layer, setting.where)
+            yield StudyVariant(label, label, layer, setting.where)
 
     def _axis_values(
-        self, axis: Setting, name: tuple[str, ...], lasts: Mapping[str, int]
+        self, axis: Setting, name: tuple[str, ...], counts: Mapping[str, int]
     ) -> Iterator[tuple[str, Layer]]:
         """Yield a label, such as ``"discount=0.9"``, and the setting for each value of an axis."""
         if not isinstance(axis.value, list) or not axis.value:
             raise self.file.error(axis.where, f"must be an array of values, got {axis.value!r}")
-        shown = name[:1] if name == ("agent", "name") else name
-        word = shown[-1] if lasts[name[-1]] == 1 else ".".join(shown)
+        path = name[:1] if name == ("agent", "name") else name  # "agent=..." is the usual name
+        short_name = path[-1] if counts[name[-1]] == 1 else ".".join(path)
         texts = (v if isinstance(v, str) else json.dumps(v, default=str) for v in axis.value)
-        labels = [f"{word}={text}" for text in texts]
+        labels = [f"{short_name}={text}" for text in texts]
         if len(set(labels)) < len(labels):
             raise self.file.error(axis.where, f"must be different values, got {axis.value!r}")
         for number, value in enumerate(axis.value):

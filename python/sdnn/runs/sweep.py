@@ -282,8 +282,8 @@ def _measures_section(comparison: Comparison) -> Section:
     notes = [f"The variant {variant} is the same as {first}." for variant, first in copies]
     notes += [DIFFERENCE_NOTE] if any(m.differences for m in measured) else []
     notes += [SOLVED_NOTE] if any(m.solved_at_end is not None for m in measured) else []
-    shown = {name for m in measured for name in m.result.values}
-    return measures_section((name for name in MEASURES if name in shown), notes)
+    names = {name for m in measured for name in m.result.values}
+    return measures_section((name for name in MEASURES if name in names), notes)
 
 
 def study_json(comparison: Comparison, digest: str, addition: Addition) -> dict[str, object]:

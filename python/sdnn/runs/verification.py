@@ -60,7 +60,7 @@ class ResumedTrial(PlannedTrial):
     goals: tuple[Goal, ...] = ()
 
     def make(self) -> TrainingTrial:
-        """Make the training; a target ends with the first new goal."""
+        """Make the training with the run's new goals, the first of which replaced any target."""
         budget = self.spec.budget.replace(target_return=None)
         spec = self.spec.replace(seed=self.key.seed, budget=budget)
         return spec.make_training([_NewGoals(self.goals)])
@@ -150,7 +150,8 @@ def choose_trials(
     drawn = [[group[i] for i in generator.permutation(len(group))] for group in groups.values()]
     drawn = [drawn[i] for i in generator.permutation(len(drawn))]
     longest = max(map(len, drawn), default=0)
-    in_turn = [group[place] for place in range(longest) for group in drawn if place < len(group)]
+    # The first trial of each group, then the second of each, until all are listed.
+    in_turn = [group[turn] for turn in range(longest) for group in drawn if turn < len(group)]
     return sorted(in_turn[:n_trials])
 
 
@@ -195,7 +196,7 @@ def verify(
     for number, is_intact in enumerate(reports.check(others)):
         observe(Counted("checksums of the other trials", number + 1, len(others)))
         if not is_intact:
-            chosen.add(others[number])  # shows the row
+            chosen.add(others[number])  # running it shows which row has changed
     reported = {trial.key: trial for trial in reports.load(chosen)}
     plan, differences = _plan(reported.values(), reports, consent or Consent())
     results, signal = _run(plan, executor, observe)
@@ -209,9 +210,10 @@ def verify(
             differences[key] = difference
         else:
             equal.append((trial, result))
-    again = [p for p in plan if p.key in differences and not p.spec.is_compiled]
-    if again and signal is None:
-        repeated, signal = _run(again, executor, observe)
+    # A difference may come from an environment that does not repeat itself: run those twice.
+    unexplained = [p for p in plan if p.key in differences and not p.spec.is_compiled]
+    if unexplained and signal is None:
+        repeated, signal = _run(unexplained, executor, observe)
         for key in repeated:
             if _are_different(results[key], repeated[key]):
                 problem = "its environment or agent does not repeat itself: two runs here differ"

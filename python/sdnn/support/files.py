@@ -258,11 +258,12 @@ def read_file(path: Path, *contents: str) -> tuple[Description, Arrays]:
     if data[_CHECKSUM] != _checksum(memoryview(data)):
         raise ValueError(f"{path} is damaged: its checksum does not fit its content")
     end = _LENGTH_BYTES + int.from_bytes(data[:_LENGTH_BYTES], "little")
+    # A header that lists far more arrays than the content can hold would take long to read.
     n_arrays, n_bytes = data.count(b'"dtype"', _LENGTH_BYTES, end), max(len(data) - end, 0)
     if n_arrays > MOST_EMPTY_ARRAYS + n_bytes // 2:
         raise ValueError(f"{path} is damaged: it has {n_arrays} arrays in {n_bytes} bytes")
     try:
-        header = json.loads(data[8:end])
+        header = json.loads(data[_LENGTH_BYTES:end])
         about = json.loads(header["__metadata__"]["sdnn"])
         number, content, version = (about[key] for key in ("format", "kind", "version"))
         description = dict(about["description"])

@@ -123,6 +123,7 @@ def advice(
     'did you mean budget.steps? possible: seed'
     """
     known = tuple(possible)
+    # Names by similarity: a low cutoff for the order of the list, a high one for a suggestion.
     word = name.strip("-").replace("-", "_").lower()
     meanings = (word, *HABITS.get(word, ()))
     near = difflib.get_close_matches(name, known, n=3, cutoff=0.5)

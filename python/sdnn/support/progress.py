@@ -59,7 +59,7 @@ class ProgressBars:
     def __exit__(self, *_error: object) -> None:
         if not self._progress.disable:  # rich 14.2 and older would print an empty line
             self._progress.stop()
-        self._due = 0.0
+        self._due = 0.0  # draw at once, even if the last picture is recent
         self._draw()
 
     def _draw(self) -> None:

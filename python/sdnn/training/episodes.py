@@ -238,7 +238,7 @@ class Episodes:
 
     def abandon(self) -> None:
         """Abandon all present episodes: the next step begins new ones, with other seeds."""
-        self.adapter = type(self.adapter)(self._env)
+        self.adapter = type(self.adapter)(self._env)  # without the outcome of the last step
         self.present[:] = [None] * self.n_environments
         self.unlearned = []
         self._begins_with_step = {}
