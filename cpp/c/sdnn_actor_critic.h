@@ -72,6 +72,7 @@ static inline int64_t sdnn_best_sum(const sdnn_agent* agent, const sdnn_code* co
 
 #include "sdnn_linear_td.h"
 
+/* Corrects the critic's only row; see sdnn_linear_td.h. */
 static inline uint32_t sdnn_move_rows(sdnn_agent* agent, const sdnn_code* code,
                                       const uint32_t* action, int32_t gain, int32_t step,
                                       uint32_t shift, int32_t correction) {
@@ -79,6 +80,7 @@ static inline uint32_t sdnn_move_rows(sdnn_agent* agent, const sdnn_code* code,
   return sdnn_move_row(agent, SDNN_CRITIC_ROW, code, gain, step, shift, correction);
 }
 
+/* Sets both learning rates by the schedule, to at least one unit. */
 static inline void sdnn_apply_rates(sdnn_agent* agent) {
   agent->rate = sdnn_scheduled(agent, SDNN_RATE_FIRST, SDNN_RATE_LAST);
   if (agent->rate == 0) agent->rate = 1;
@@ -151,8 +153,8 @@ static inline uint64_t sdnn_weights_of(const sdnn_agent* agent, const sdnn_code*
   return sdnn_weigh(bits, sdnn_n_actions[d], weights);
 }
 
-/* Minus the derivative of the entropy by each preference, p (log p + H), and the probabilities p,
- * all 2^16 for 1. Replaces the bits by the slopes, and the weights by the probabilities. */
+/* Replaces `weights` by the probabilities p, and `bits` by minus the slope of the entropy H by each
+ * preference, p (log p + H), both in units of 2^-16. */
 static inline void sdnn_differentiate(int64_t* bits, uint32_t* weights, uint32_t n, uint64_t sum) {
   const int64_t ln_of_2 = 45426, log2_sum = sdnn_log2_of(sum); /* 2^16 for 1 */
   int64_t entropy = 0;
@@ -349,6 +351,7 @@ static inline int sdnn_is_exponent(int32_t exponent) {
   return exponent >= -1100 && exponent <= 1100;
 }
 
+/* Whether a head, which may be damaged, has possible numbers at the offsets of sdnn_carry_head. */
 static inline int sdnn_is_head(const uint8_t* head) {
   const int32_t exponent = sdnn_get_32(head + 8);
   return sdnn_are_generators(head + 56) && (exponent == INT32_MIN || sdnn_is_exponent(exponent)) &&

@@ -34,7 +34,8 @@ static inline sdnn_real sdnn_uniform(sdnn_random* random) {
   return sdnn_real_of((int64_t)(sdnn_bits(random) >> 11), -53);
 }
 
-/* The change of a weight, which is twice as large for half a sum or half a difference. */
+/* The change of a weight for a change of x_SD. The paired code has half the sum and half the
+ * difference of two columns, for which it is twice as large. */
 static inline int32_t sdnn_change(uint32_t column, int32_t change) {
 #if SDNN_N_DOUBLE_GROUPS > 0 && SDNN_N_DOUBLE_GROUPS < SDNN_N_GROUPS
   return column < UINT32_C(1) * SDNN_N_DOUBLE_GROUPS * SDNN_N_PATTERN_UNITS ? 2 * change : change;
@@ -186,6 +187,7 @@ static inline uint32_t sdnn_fires(int32_t potential) {
   return 1 - (((uint32_t)potential - 1) >> 31);
 }
 
+/* The number of firing units in an action's window, which stands for its value. */
 static inline uint32_t sdnn_count(const sdnn_state* state, uint32_t action) {
   const int32_t* const potentials = state->potentials + sdnn_first_units[action];
   uint32_t unit, n_firing = 0;
@@ -241,6 +243,7 @@ static inline uint32_t sdnn_rank(const sdnn_state* state, uint32_t below, uint32
   return n_best;
 }
 
+/* The value of the best action in a state. */
 static inline sdnn_real sdnn_state_value(sdnn_agent* agent, const uint32_t* bins) {
   uint32_t ranks[SDNN_N_ACTIONS];
   const sdnn_state* const state = sdnn_state_of(agent, bins);
@@ -399,6 +402,7 @@ static inline sdnn_real sdnn_scheduled(sdnn_real progress, sdnn_real fraction, s
   return sdnn_plus(sdnn_times(sdnn_minus(SDNN_ONE, part), first), sdnn_times(part, last));
 }
 
+/* Sets the learning rate and epsilon by the schedule, for a progress in [0, 1]. */
 static inline void sdnn_follow_progress(sdnn_agent* agent, sdnn_real progress) {
   agent->progress = progress;
   agent->rate = sdnn_scheduled(progress, SDNN_RATE_FRACTION, SDNN_RATE_FIRST, SDNN_RATE_LAST);
@@ -449,6 +453,8 @@ static inline void sdnn_draw_weights(sdnn_agent* agent) {
 }
 #endif
 
+/* Whether the next step takes the random action agent->kept, which is drawn here unless it is
+ * being repeated. */
 static inline int sdnn_explores(sdnn_agent* agent) {
   const uint32_t step = agent->step++;
   const int at_random = agent->n_random_left > 0;

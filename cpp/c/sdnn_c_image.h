@@ -85,7 +85,7 @@ static inline void sdnn_carry_range(sdnn_agent* agent, const sdnn_part* part, in
 }
 #endif
 
-/* Moves the numbers of arrays that are in a part of an image. */
+/* Reads the numbers of arrays in a part of an image, or writes them to it. */
 static inline void sdnn_carry_arrays(sdnn_agent* agent, const sdnn_part* part, int reads) {
 #if SDNN_ADAPTS
   sdnn_carry_range(agent, part, reads);
@@ -98,7 +98,8 @@ static inline void sdnn_carry_arrays(sdnn_agent* agent, const sdnn_part* part, i
 static inline int sdnn_is_real(sdnn_real x) { return x << 1 >> 1 <= UINT64_C(1123) << 52; }
 
 #if SDNN_ADAPTS
-/* Whether a head has a possible range, and possible numbers of rewards and returns. */
+/* Whether a head has a possible range, and possible numbers of rewards and returns, at the offsets
+ * where sdnn_carry_head puts them. */
 static inline int sdnn_is_range(const uint8_t* head) {
   const uint64_t n_returns = sdnn_get(head + 244, 8), due = sdnn_get(head + 252, 8);
   const uint32_t n_kept = (uint32_t)sdnn_get(head + 264, 4);
@@ -114,6 +115,7 @@ static inline int sdnn_is_range(const uint8_t* head) {
 }
 #endif
 
+/* Whether a head, which may be damaged, has possible numbers at the offsets of sdnn_carry_head. */
 static inline int sdnn_is_head(const uint8_t* head) {
   const sdnn_real q_low = sdnn_get(head + 204, 8), q_high = sdnn_get(head + 212, 8);
 #if SDNN_ADAPTS

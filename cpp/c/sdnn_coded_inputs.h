@@ -12,12 +12,14 @@ typedef union {
   sdnn_real bits;
 } sdnn_double;
 
+/* A double as its bits, with which sdnn_real.h calculates. */
 static inline sdnn_real sdnn_bits_of(double number) {
   sdnn_double both;
   both.number = number;
   return both.bits;
 }
 
+/* The double with these bits. */
 static inline double sdnn_double_of(sdnn_real bits) {
   sdnn_double both;
   both.bits = bits;
@@ -71,6 +73,8 @@ static inline uint32_t sdnn_bin_at(sdnn_real position, uint32_t n_bins) {
   return bin < n_bins ? bin : n_bins - 1;
 }
 
+/* The position in [0, 1] of a number in a range; `values` are its ends, half of the low end,
+ * and half of its width. */
 static inline sdnn_real sdnn_even_position(const sdnn_real* values, sdnn_real x) {
   const sdnn_real inside = sdnn_between(x, values[0], values[1]);
   if (values[3] << 1 == 0) return 0;
@@ -99,6 +103,8 @@ static inline sdnn_real sdnn_position_of_knots(const sdnn_real* knots, uint32_t 
 #endif
 
 #if SDNN_HAS_CIRCLES
+/* The largest integer that is not above x. Exponents of doubles have a bias of 1023; from 2^52
+ * on all numbers are integers. */
 static inline sdnn_real sdnn_floor(sdnn_real x) {
   const uint32_t exponent = (uint32_t)(x >> 52 & 2047);
   uint64_t rest;
@@ -109,6 +115,7 @@ static inline sdnn_real sdnn_floor(sdnn_real x) {
   return x >> 63 && rest != 0 ? sdnn_minus(x, SDNN_ONE) : x;
 }
 
+/* The bin of a number that repeats: `values` are the beginning of a turn and its length. */
 static inline uint32_t sdnn_bin_on_circle(const sdnn_real* values, uint32_t n_bins, sdnn_real x) {
   const sdnn_real digits = sdnn_real_of(1000000000, 0), shift = sdnn_real_of(1, 52);
   sdnn_real turns, place;

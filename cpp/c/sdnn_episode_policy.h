@@ -51,6 +51,7 @@ static inline const int32_t* sdnn_filled_int32_t(sdnn_episode* episode,
 #endif
 }
 #ifdef SDNN_USE_FLOAT
+/* The observation, with missing readings replaced by the last ones if the agent holds them. */
 static inline const double* sdnn_filled_double(sdnn_episode* episode, const double* observation) {
 #ifdef SDNN_HOLDS
   sdnn_hold_doubles(episode->held_doubles, observation);
@@ -137,6 +138,7 @@ SDNN_STEP(int32_t, sdnn_inputs_of_fixed)
 SDNN_POLICY(sdnn_greedy, int32_t, sdnn_greedy_in_each, sdnn_note_action)
 #ifdef SDNN_USE_FLOAT
 SDNN_STEP(double, sdnn_inputs_of_double)
+/* Like sdnn_step_of_double, for an observation of floats. */
 static inline void sdnn_step_of_float(sdnn_episode* episode, const float* observation,
                                       uint32_t* bins) {
   double doubles[SDNN_N_OBSERVED];

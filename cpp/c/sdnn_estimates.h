@@ -1,4 +1,4 @@
-/* What an estimator predicts from the totals of its groups of units.
+/* An estimator's predictions, from the totals of its groups of units.
  *
  * A group has SDNN_GROUP_SIZE units. Its total is the number of units that fire, or with one unit
  * its potential, summed over SDNN_N_NETWORKS networks. */

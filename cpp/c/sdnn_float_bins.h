@@ -10,6 +10,7 @@
  * -ffast-math, no x87). NaN counts as the lowest reading. A cosine and sine of which one is NaN or
  * infinite count as the angle 0. */
 
+/* The bin of a number in [0, 1]; numbers beyond are clipped, and NaN counts as 0. */
 static inline uint32_t sdnn_bin_of_unit(double unit, uint32_t n_bins) {
   uint32_t bin;
   if (!(unit > 0.0)) return 0;
@@ -18,6 +19,7 @@ static inline uint32_t sdnn_bin_of_unit(double unit, uint32_t n_bins) {
   return bin < n_bins ? bin : n_bins - 1;
 }
 
+/* The fraction of a number of turns, in [0, 1). From 2^52 on, a double has no fraction. */
 static inline double sdnn_part_of_turn(double turns) {
   double whole;
   if (!(turns > -4503599627370496.0 && turns < 4503599627370496.0)) return 0.0;
@@ -26,6 +28,8 @@ static inline double sdnn_part_of_turn(double turns) {
   return turns - whole;
 }
 
+/* The bin of an angle by its cosine and sine, scaled to integers of up to 2^30. Without a
+ * direction, the bin of angle 0. */
 static inline uint32_t sdnn_bin_of_doubles(const int32_t (*bounds)[2], uint32_t n_bins,
                                            double cosine, double sine) {
   const double x = cosine < 0.0 ? -cosine : cosine;
@@ -38,6 +42,7 @@ static inline uint32_t sdnn_bin_of_doubles(const int32_t (*bounds)[2], uint32_t 
                                (int32_t)(sine / largest * 1073741824.0));
 }
 
+/* The symbol of a one-hot code: the number of the largest reading, the first of equals. */
 static inline uint32_t sdnn_symbol_of_double(const double* readings, uint32_t n) {
   uint32_t k, symbol = 0;
   for (k = 1; k < n; ++k) {
@@ -73,6 +78,7 @@ static inline void sdnn_bins_of_double(const double* observation, uint32_t* bins
 #undef SDNN_LACKS
 }
 
+/* Like sdnn_bins_of_double, for an observation of floats. */
 static inline void sdnn_bins_of_float(const float* observation, uint32_t* bins) {
   double doubles[SDNN_N_OBSERVED];
   uint32_t i;

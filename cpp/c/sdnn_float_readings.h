@@ -13,6 +13,7 @@ static inline int sdnn_lacks_double(const double* readings, uint32_t n) {
   }
   return 0;
 }
+/* Whether one of n readings is missing. */
 static inline int sdnn_lacks_float(const float* readings, uint32_t n) {
   for (; n > 0; --n, ++readings) {
     const double reading = (double)*readings;
@@ -22,7 +23,7 @@ static inline int sdnn_lacks_float(const float* readings, uint32_t n) {
 }
 
 #ifdef SDNN_HOLDS
-/* As sdnn_hold_readings and sdnn_forget_held, whose memory NaN fills here. */
+/* Like sdnn_hold_readings and sdnn_forget_held, with NaN for readings that are not known yet. */
 static inline void sdnn_hold_doubles(double* held, const double* observation) {
   uint32_t part, i, at = 0;
   for (part = 0; part < SDNN_N_PARTS; ++part) {
@@ -32,6 +33,7 @@ static inline void sdnn_hold_doubles(double* held, const double* observation) {
     at += n;
   }
 }
+/* Makes all held readings NaN, which stands for none. */
 static inline void sdnn_forget_held_doubles(double* held) {
   union {
     uint64_t bits;

@@ -27,6 +27,7 @@ static inline uint32_t sdnn_best_action(const sdnn_code* code, uint32_t d, uint3
   return action;
 }
 
+/* Writes the most probable action in each dimension. */
 static inline void sdnn_greedy_in_each(const uint32_t* bins, uint32_t* action) {
   sdnn_code code;
   uint32_t d;
@@ -41,6 +42,8 @@ static inline void sdnn_greedy_in_each(const uint32_t* bins, uint32_t* action) {
 #endif
 
 #if SDNN_IS_BOX
+/* Writes the fractional index of the best action in each dimension, times 2^16: the mean of its
+ * index and its neighbours' ones, weighted by their probabilities. */
 static inline void sdnn_place_of_bins(const uint32_t* bins, uint32_t* place) {
   sdnn_code code;
   uint32_t d;

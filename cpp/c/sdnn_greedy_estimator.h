@@ -6,8 +6,8 @@
 #include "sdnn_input_pairs.h"
 #include "sdnn_weight_bytes.h"
 
-/* What a weight has beyond its byte: of a unit, in the column of a pair and a unit of its pattern.
- */
+/* The excess of a weight that does not fit a byte, beyond its byte: the weight of a unit for the
+ * column of a pair and a unit of its pattern. */
 typedef struct {
   uint16_t unit;
   uint16_t pair;

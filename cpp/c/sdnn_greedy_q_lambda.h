@@ -15,6 +15,7 @@ static inline uint32_t sdnn_best_action(const sdnn_code* code, uint32_t d) {
                    sdnn_largest(sums, sdnn_n_actions[d]) - SDNN_TIE_TOLERANCE);
 }
 
+/* Writes the action with the highest value in each dimension. */
 static inline void sdnn_greedy_in_each(const uint32_t* bins, uint32_t* action) {
   sdnn_code code;
   uint32_t d;

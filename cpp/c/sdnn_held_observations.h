@@ -14,6 +14,7 @@ typedef struct {
 
 static inline void sdnn_forget(sdnn_states* states) { sdnn_forget_readings(&states->readings); }
 
+/* The bins of an observation in which the agent acts; its readings are held for later gaps. */
 static inline void sdnn_read_to_act(sdnn_states* states, const int32_t* observation,
                                     uint32_t* bins) {
   sdnn_bins_of_fixed(sdnn_note_readings(&states->readings, observation), bins);
@@ -27,6 +28,7 @@ static inline void sdnn_read_greedily(const sdnn_states* states, sdnn_greedy_epi
                                       const int32_t* observation, uint32_t* bins) {
   sdnn_bins_of_fixed(sdnn_readings_of(&states->readings, episode, observation), bins);
 }
+/* Nothing to note: only agents with a history need greedy actions. */
 static inline void sdnn_note_greedy(const sdnn_greedy_episode* episode, const uint32_t* action,
                                     const uint32_t* place) {
   (void)episode;
@@ -39,6 +41,7 @@ static inline void sdnn_begin_greedy(const sdnn_states* states, sdnn_greedy_epis
   episode->n_reads = states->readings.n_reads;
 }
 
+/* The bins of an observation, without holding its readings. */
 static inline void sdnn_read_only(const sdnn_states* states, const int32_t* observation,
                                   uint32_t* bins) {
   int32_t held[SDNN_N_OBSERVED];
@@ -46,6 +49,7 @@ static inline void sdnn_read_only(const sdnn_states* states, const int32_t* obse
   sdnn_bins_of_fixed(held, bins);
 }
 
+/* The bins of the observation after an action. */
 static inline void sdnn_read_next(sdnn_states* states, const uint32_t* action,
                                   const int32_t* next_observation, uint32_t* bins) {
   (void)action;

@@ -136,7 +136,8 @@ static inline void sdnn_predict(sdnn_episode* episode) {
   }
 }
 
-/* Moves predicted estimates by the errors of the predictions. */
+/* Moves predicted estimates by the errors of the predictions, in standard deviations. Errors of
+ * other inputs are limited, so that a wrong reading does not spread. */
 static inline void sdnn_correct_estimates(sdnn_real* estimates, const sdnn_real* errors) {
   const sdnn_real farthest = UINT64_C(0x4018000000000000); /* 6 */
   const sdnn_real* gain = sdnn_gains;
@@ -152,6 +153,7 @@ static inline void sdnn_correct_estimates(sdnn_real* estimates, const sdnn_real*
   }
 }
 
+/* Predicts the inputs, corrects the estimates by the errors, and writes these to the state. */
 static inline void sdnn_remember(sdnn_episode* episode, const sdnn_real* inputs, sdnn_real* state) {
   sdnn_real *const estimates = episode->memory, errors[SDNN_N_NUMBERS];
   uint32_t k;
@@ -182,6 +184,7 @@ static inline sdnn_real sdnn_difference(sdnn_real first, sdnn_real second, uint3
   return sdnn_is_circular[k] ? sdnn_minus(change, sdnn_nearest(change)) : change;
 }
 
+/* Writes the differences or the averages of inputs to the state, after the inputs themselves. */
 static inline void sdnn_remember(sdnn_episode* episode, const sdnn_real* inputs, sdnn_real* state) {
   sdnn_real* const added = state + SDNN_N_OBSERVED_INPUTS;
   uint32_t k;
@@ -223,6 +226,7 @@ static inline void sdnn_continue(sdnn_episode* episode, const sdnn_real* inputs,
   episode->has_begun = 1;
 }
 
+/* The bins of a state's numbers in [0, 1]. */
 static inline void sdnn_bins_of_state(const sdnn_real* state, uint32_t* bins) {
   uint32_t i;
   for (i = 0; i < SDNN_N_INPUTS; ++i) {

@@ -1,5 +1,5 @@
-/* The states of a learning agent, where they include earlier observations: of the episode from
- * which it learns, and of greedy steps beside it, whose memory the caller places. See
+/* The states of a learning agent, where they include earlier observations. The episode from which
+ * it learns and greedy episodes have separate memories; the caller provides the latter. See
  * cpp/include/sdnn/agents/detail/last_states.hpp. */
 #ifndef SDNN_HISTORY_LEARNER_H
 #define SDNN_HISTORY_LEARNER_H
@@ -69,8 +69,8 @@ static inline void sdnn_restart(sdnn_last_state* last, const int32_t* observatio
   sdnn_advance(last, observation);
 }
 
-/* Makes it the state of an observation in which the agent acts. After an action that is the next
- * step. Otherwise an equal observation is the same state, and any other begins an episode. */
+/* Makes `last` the state of an observation in which the agent acts. After an action this is the
+ * next step. Otherwise an equal observation is the same state, and any other begins an episode. */
 static inline void sdnn_find_state(sdnn_last_state* last, const int32_t* observation) {
   observation = sdnn_filled(last, observation);
   if (last->has_acted) {
@@ -87,6 +87,7 @@ static inline void sdnn_copy_bytes(void* to, const void* from, uint32_t n) {
   for (; n > 0; --n) *target++ = *source++;
 }
 
+/* Forgets a state and its history, before an episode begins. */
 static inline void sdnn_forget_state(sdnn_last_state* last) {
 #ifdef SDNN_HOLDS
   sdnn_forget_held(last->episode.held);

@@ -21,7 +21,7 @@
 #endif
 typedef char sdnn_needs_parts_of_16_bytes[SDNN_PART_BYTES % 16 == 0 ? 1 : -1];
 
-/* What a CRC-32 of a content and its checksum comes to. */
+/* The CRC-32 of any content followed by its own checksum. */
 #define SDNN_UNDAMAGED UINT32_C(0xdebb20e3)
 
 /* Reads n bytes of an image, from `offset` on. Returns whether it could. */

@@ -50,6 +50,8 @@ static inline int32_t sdnn_sign_of(const uint32_t* bins, const sdnn_pair* pair, 
 }
 #endif
 
+/* Lists the columns of a sample's code that are not 0: those of +1 from the beginning of
+ * `columns`, those of -1 from its end. A unit is 0 where its modifier's unit is off. */
 static inline void sdnn_encode(const uint32_t* bins, sdnn_code* code) {
   sdnn_column* positive = &code->columns[0];
   sdnn_column* negative = code->columns + SDNN_MOST_COLUMNS;

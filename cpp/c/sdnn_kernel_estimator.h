@@ -19,6 +19,7 @@ typedef struct {
 
 static const sdnn_correlation sdnn_correlation_of[SDNN_N_INPUTS] = {SDNN_CORRELATION_OF};
 
+/* The correlation of the patterns of two bins of an input. Bin n stands for a missing value. */
 static inline sdnn_real sdnn_rho(uint32_t input, uint32_t a, uint32_t b) {
   const sdnn_correlation* const correlation = &sdnn_correlation_of[input];
   const uint32_t n = sdnn_inputs[input].n_bins;
@@ -106,6 +107,7 @@ static inline int sdnn_outputs_of(const double* x, sdnn_real* outputs) {
   return 1;
 }
 
+/* Writes the outputs for a sample x; returns 0 if it is impossible. */
 static inline int sdnn_write_outputs(const double* x, double* y) {
   sdnn_real outputs[SDNN_N_SUMS];
   uint32_t k;

@@ -9,6 +9,7 @@ typedef struct sdnn_random {
   uint64_t words[4];
 } sdnn_random;
 
+/* The next 64 random bits, by xoshiro256**. */
 static inline uint64_t sdnn_bits(sdnn_random* random) {
   uint64_t* const s = random->words;
   const uint64_t five = s[1] * 5, shifted = s[1] << 17;
@@ -80,17 +81,20 @@ static inline void sdnn_copy_32(int32_t* to, const int32_t* from, uint32_t n) {
   for (; n > 0; --n) *target++ = *from++;
 }
 
+/* Writes an integer as n bytes, the lowest first; returns where they end. */
 static inline uint8_t* sdnn_put(uint8_t* at, uint64_t value, uint32_t n_bytes) {
   for (; n_bytes > 0; --n_bytes, value >>= 8) *at++ = (uint8_t)(value & 255);
   return at;
 }
 
+/* An integer of up to 8 bytes, the lowest first. */
 static inline uint64_t sdnn_get(const uint8_t* at, uint32_t n_bytes) {
   uint64_t value = 0;
   while (n_bytes-- > 0) value = value << 8 | at[n_bytes];
   return value;
 }
 
+/* The signed integer with these bits; C leaves the conversion of large ones to the compiler. */
 static inline int32_t sdnn_signed(uint32_t value) {
   return value >> 31 ? -(int32_t)~value - 1 : (int32_t)value;
 }
@@ -112,6 +116,7 @@ static inline uint8_t* sdnn_carry_32(uint8_t* at, void* numbers, uint32_t n, int
   return at;
 }
 
+/* Reads numbers of 64 bits from an image or writes them to it; returns the end of their bytes. */
 static inline uint8_t* sdnn_carry_64(uint8_t* at, void* numbers, uint32_t n, int reads) {
   uint64_t* number = (uint64_t*)numbers;
   for (; n > 0; --n, at += 8, ++number) {
@@ -124,6 +129,7 @@ static inline uint8_t* sdnn_carry_64(uint8_t* at, void* numbers, uint32_t n, int
   return at;
 }
 
+/* Reads the scale of rewards from an image or writes it. */
 static inline uint8_t* sdnn_carry_scale(uint8_t* at, sdnn_scale* scale, int reads) {
   at = sdnn_carry_64(at, &scale->n_rewards, 1, reads);
   at = sdnn_carry_32(at, &scale->size, 1, reads);

@@ -37,7 +37,7 @@ static inline int16_t sdnn_largest_weight(const sdnn_model* model, uint32_t unit
   return (int16_t)largest;
 }
 
-/* Begins with what the header has learned. */
+/* Begins with the weights, thresholds and ranges that the exporter wrote. */
 static inline void sdnn_begin(sdnn_model* model) {
   uint32_t i;
   for (i = 0; i < (uint32_t)SDNN_N_COLUMNS * SDNN_N_UNITS; ++i) {
@@ -52,6 +52,7 @@ static inline void sdnn_begin(sdnn_model* model) {
 #endif
 }
 
+/* Sums each unit's weights over the columns of the code, minus its threshold. */
 static inline void sdnn_potentials(const sdnn_model* model, const sdnn_code* code,
                                    int32_t* potentials) {
   const sdnn_column* column = code->columns;
@@ -68,7 +69,7 @@ static inline void sdnn_potentials(const sdnn_model* model, const sdnn_code* cod
   }
 }
 
-/* The totals of groups of units. */
+/* Writes the total of each group: its number of firing units, or the potential of its only unit. */
 static inline void sdnn_totals_of(const int32_t* potentials, sdnn_total* totals) {
 #if SDNN_COUNTS_UNITS
   uint32_t group, unit;
@@ -155,6 +156,7 @@ static inline int sdnn_correct(sdnn_model* model, const sdnn_code* code,
   return 1;
 }
 
+/* Lists a correction, in direction 1 or -1, of a unit. */
 static inline void sdnn_add_correction(sdnn_corrections* corrections, uint32_t unit,
                                        int32_t direction) {
   corrections->units[corrections->n] = (uint16_t)unit;

@@ -85,7 +85,7 @@ static inline void sdnn_greedy_in_each(const sdnn_agent* agent,
   sdnn_choose(agent, 0, SDNN_EPISODE observation, action, 0);
 }
 
-/* That of the kept policy, or of the present one where none is kept. */
+/* The greedy action of the kept policy, or of the present one where none is kept. */
 static inline void sdnn_best_in_each(const sdnn_agent* agent, const sdnn_keeper* keeper,
                                      SDNN_EPISODE_PARAMETER const int32_t* observation,
                                      uint32_t* action) {
@@ -101,6 +101,7 @@ static inline void sdnn_place_in_each(const sdnn_agent* agent,
   uint32_t action[SDNN_N_DIMENSIONS];
   sdnn_choose(agent, 0, SDNN_EPISODE observation, action, place);
 }
+/* Like sdnn_best_in_each, but writes fractional indices, times 2^16. */
 static inline void sdnn_best_place_in_each(const sdnn_agent* agent, const sdnn_keeper* keeper,
                                            SDNN_EPISODE_PARAMETER const int32_t* observation,
                                            uint32_t* place) {
@@ -110,17 +111,20 @@ static inline void sdnn_best_place_in_each(const sdnn_agent* agent, const sdnn_k
 #endif
 
 #if SDNN_N_DIMENSIONS == 1
+/* Like sdnn_act_in_each, for actions of one dimension. */
 static inline uint32_t sdnn_act(sdnn_agent* agent, const int32_t* observation) {
   uint32_t action;
   sdnn_act_in_each(agent, observation, &action);
   return action;
 }
+/* Like sdnn_greedy_in_each, for actions of one dimension. */
 static inline uint32_t sdnn_greedy(const sdnn_agent* agent,
                                    SDNN_EPISODE_PARAMETER const int32_t* observation) {
   uint32_t action;
   sdnn_greedy_in_each(agent, SDNN_EPISODE observation, &action);
   return action;
 }
+/* Like sdnn_best_in_each, for actions of one dimension. */
 static inline uint32_t sdnn_best(const sdnn_agent* agent, const sdnn_keeper* keeper,
                                  SDNN_EPISODE_PARAMETER const int32_t* observation) {
   uint32_t action;
@@ -132,12 +136,14 @@ static inline void sdnn_learn(sdnn_agent* agent, const int32_t* observation, uin
   sdnn_learn_in_each(agent, observation, &action, reward, next_observation, terminated);
 }
 #if SDNN_IS_BOX
+/* Like sdnn_place_in_each, for actions of one dimension. */
 static inline uint32_t sdnn_place(const sdnn_agent* agent,
                                   SDNN_EPISODE_PARAMETER const int32_t* observation) {
   uint32_t place;
   sdnn_place_in_each(agent, SDNN_EPISODE observation, &place);
   return place;
 }
+/* Like sdnn_best_place_in_each, for actions of one dimension. */
 static inline uint32_t sdnn_best_place(const sdnn_agent* agent, const sdnn_keeper* keeper,
                                        SDNN_EPISODE_PARAMETER const int32_t* observation) {
   uint32_t place;

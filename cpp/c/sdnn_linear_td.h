@@ -100,6 +100,7 @@ static inline void sdnn_fit_unit(sdnn_agent* agent, int32_t reward) {
   }
 }
 
+/* A reward in the unit of values, 2^exponent; 0 until a reward has determined the exponent. */
 static inline int64_t sdnn_units_of(const sdnn_agent* agent, int32_t reward) {
   const int32_t shift = -SDNN_FRACTION_BITS - agent->exponent;
   if (!agent->has_exponent || reward == 0 || shift < -62) return 0;

@@ -15,6 +15,7 @@
 #include "sdnn_observation.h"
 
 #if SDNN_N_DIMENSIONS == 1
+/* The greedy action in a state, for actions of one dimension. */
 static inline uint32_t sdnn_greedy_bins(const uint32_t* bins) {
   uint32_t action;
   sdnn_greedy_in_each(bins, &action);

@@ -73,6 +73,7 @@ static inline int64_t sdnn_sum(const int32_t* rows, const sdnn_code* code, const
   return total;
 }
 
+/* The sum over dimensions of the best action's value, in units. */
 static inline int64_t sdnn_best_sum(const sdnn_agent* agent, const sdnn_code* code) {
   int64_t sums[SDNN_MOST_ROWS], total = 0;
   uint32_t d;
@@ -89,6 +90,7 @@ static inline void sdnn_encode_state(const uint32_t* bins, sdnn_code* code) {
 
 #include "sdnn_linear_td.h"
 
+/* Sets the learning rate, to at least one unit, and epsilon by the schedule. */
 static inline void sdnn_apply_rates(sdnn_agent* agent) {
   agent->rate = sdnn_scheduled(agent, SDNN_RATE_FIRST, SDNN_RATE_LAST);
   if (agent->rate == 0) agent->rate = 1;
@@ -424,6 +426,7 @@ static inline void sdnn_begin_as(sdnn_agent* agent, const uint8_t* head) {
   sdnn_apply_rates(agent);
 }
 
+/* Whether a head, which may be damaged, has possible numbers at the offsets of sdnn_carry_head. */
 static inline int sdnn_is_head(const uint8_t* head) {
   const int32_t exponent = sdnn_get_32(head + 8);
   return sdnn_are_generators(head + 60) &&

@@ -1,6 +1,6 @@
-/* The states of a learning agent that holds the last readings, where they are those of single
- * observations: of the episode from which it learns, and of greedy steps beside it, whose memory
- * the caller places. See cpp/include/sdnn/agents/last_readings.hpp. */
+/* The states of a learning agent that replaces missing readings by the last ones. The episode from
+ * which it learns and greedy episodes have separate readings; the caller provides the latter. See
+ * cpp/include/sdnn/agents/last_readings.hpp. */
 #ifndef SDNN_READINGS_H
 #define SDNN_READINGS_H
 
@@ -22,6 +22,7 @@ static inline void sdnn_forget_readings(sdnn_greedy_episode* readings) {
   ++readings->n_reads;
 }
 
+/* Holds the readings that are not missing, and returns all held ones. */
 static inline const int32_t* sdnn_note_readings(sdnn_greedy_episode* readings,
                                                 const int32_t* observation) {
   sdnn_hold_readings(readings->held, observation);

@@ -46,6 +46,8 @@ static inline uint64_t sdnn_fraction(sdnn_real x, int32_t* exponent) {
   return fraction;
 }
 
+/* The sum of two doubles, rounded like IEEE 754: fractions are aligned by their exponents, and
+ * bits that are shifted out leave a mark in the last one. */
 static inline sdnn_real sdnn_plus(sdnn_real a, sdnn_real b) {
   int32_t exponent, other;
   uint64_t x, y, shift;
@@ -68,6 +70,8 @@ static inline sdnn_real sdnn_minus(sdnn_real a, sdnn_real b) {
   return sdnn_plus(a, b ^ SDNN_MINUS);
 }
 
+/* The product of two doubles, rounded like IEEE 754; fractions are multiplied in halves of 32
+ * bits. */
 static inline sdnn_real sdnn_times(sdnn_real a, sdnn_real b) {
   const uint64_t sign = (a ^ b) & SDNN_MINUS, low_bits = UINT32_MAX;
   int32_t exponent, other;
@@ -83,6 +87,8 @@ static inline sdnn_real sdnn_times(sdnn_real a, sdnn_real b) {
   return sdnn_rounded(sign, x, exponent + other + 42);
 }
 
+/* The quotient of two doubles, rounded like IEEE 754, by long division. Requires b other than
+ * 0. */
 static inline sdnn_real sdnn_over(sdnn_real a, sdnn_real b) {
   const uint64_t sign = (a ^ b) & SDNN_MINUS;
   int32_t exponent, other, i;
@@ -100,6 +106,7 @@ static inline sdnn_real sdnn_over(sdnn_real a, sdnn_real b) {
   return sdnn_rounded(sign, quotient << 1 | (x != 0), exponent - other - 56);
 }
 
+/* Whether a < b. Zeros of both signs are equal. */
 static inline int sdnn_less(sdnn_real a, sdnn_real b) {
   if ((a | b) << 1 == 0) return 0;
   if ((a ^ b) >> 63) return a >> 63 != 0;

@@ -62,14 +62,16 @@ static inline sdnn_real sdnn_return_above(const sdnn_agent* agent, uint32_t n, u
   uint32_t i, j;
   for (j = 0; j <= n; ++j) least[j] = SDNN_MOST;
   for (i = 0; i < agent->n_kept_returns; ++i) {
-    const sdnn_real one = agent->returns[i] ^ sign;
-    if (!sdnn_less(one, least[n])) continue;
-    for (j = n; j > 0 && sdnn_less(one, least[j - 1]); --j) least[j] = least[j - 1];
-    least[j] = one;
+    const sdnn_real number = agent->returns[i] ^ sign;
+    if (!sdnn_less(number, least[n])) continue;
+    for (j = n; j > 0 && sdnn_less(number, least[j - 1]); --j) least[j] = least[j - 1];
+    least[j] = number;
   }
   return least[n] ^ sign;
 }
 
+/* Moves the range if it no longer contains the returns, or is much too wide; returns whether it
+ * has moved. The lowest twentieth and the highest fiftieth of the returns are left out. */
 static inline int sdnn_follow(sdnn_agent* agent) {
   const uint32_t n = agent->n_kept_returns;
   sdnn_real low, high, most;

@@ -68,6 +68,7 @@ static inline int sdnn_find_newest(const sdnn_flash* flash, sdnn_slot* newest, u
   is_first = sdnn_is_stored(first, &counters[0]);
   is_second = sdnn_is_stored(*newest, &counters[1]);
   *counter = is_second ? counters[1] : 0;
+  /* Counters may start again from 0: the newer one is less than half a cycle ahead. */
   if (is_first && (!is_second || counters[0] - counters[1] < UINT32_C(0x80000000))) {
     *newest = first;
     *counter = counters[0];

@@ -7,7 +7,8 @@
 
 #include "sdnn_observation.h"
 
-/* Adds `sign` times the weights of four units in n columns. */
+/* Adds `sign` times the weights of four units in n columns. A word has a byte for each unit; even
+ * and odd bytes are summed in halves of 16 bits, which hold sums of 256 bytes. */
 static inline void sdnn_add_columns(const uint32_t* weights, const sdnn_column* column, uint32_t n,
                                     uint32_t sign, uint32_t* sums) {
   while (n > 0) {
@@ -30,7 +31,7 @@ static inline void sdnn_add_columns(const uint32_t* weights, const sdnn_column* 
       even += word & UINT32_C(0xff00ff);
       odd += word >> 8;
     }
-    odd -= even >> 16 << 8; /* the even ones between them */
+    odd -= even >> 16 << 8; /* the words shifted by 8 bits contained this even byte, too */
     sums[0] += sign * (even & 65535);
     sums[1] += sign * (odd & 65535);
     sums[2] += sign * (even >> 16);
