@@ -21,37 +21,37 @@ using ActionMask = std::span<const std::uint8_t>;
 /// Removes the next dimension's n entries from the mask of the remaining dimensions; returns them.
 inline ActionMask take_part(ActionMask& left, std::size_t n) noexcept {
   if (left.empty()) return {};
-  const ActionMask part = left.first(n);
+  const ActionMask mask = left.first(n);
   left = left.subspan(n);
-  return part;
+  return mask;
 }
 
-inline bool allows(ActionMask part, std::size_t action) noexcept {
-  return part.empty() || part[action] != 0;
+inline bool allows(ActionMask mask, std::size_t action) noexcept {
+  return mask.empty() || mask[action] != 0;
 }
 
 /// Whether a dimension's mask has only zeros and ones, and allows an action.
-inline bool is_mask(ActionMask part) noexcept {
-  return std::ranges::all_of(part, [](auto entry) { return entry <= 1; }) &&
-         std::ranges::find(part, 1) != part.end();
+inline bool is_mask(ActionMask mask) noexcept {
+  return std::ranges::all_of(mask, [](auto entry) { return entry <= 1; }) &&
+         std::ranges::find(mask, 1) != mask.end();
 }
 
 /// Returns an allowed one of n actions; draw(k) returns a number below k, the number of allowed
 /// ones.
 template <class Draw>
-std::size_t draw_allowed(ActionMask part, std::size_t n, const Draw& draw) {
-  if (part.empty()) return draw(n);
+std::size_t draw_allowed(ActionMask mask, std::size_t n, const Draw& draw) {
+  if (mask.empty()) return draw(n);
   std::size_t left = draw(
-      static_cast<std::size_t>(std::ranges::count_if(part, [](auto entry) { return entry != 0; })));
+      static_cast<std::size_t>(std::ranges::count_if(mask, [](auto entry) { return entry != 0; })));
   std::size_t action = 0;
-  while (part[action] == 0 || left-- > 0) ++action;
+  while (mask[action] == 0 || left-- > 0) ++action;
   return action;
 }
 
 /// Makes the values of actions that are not allowed lower than all others.
-inline void exclude(ActionMask part, std::span<double> values) noexcept {
-  for (std::size_t a = 0; a < part.size(); ++a) {
-    if (part[a] == 0) values[a] = -std::numeric_limits<double>::infinity();
+inline void exclude(ActionMask mask, std::span<double> values) noexcept {
+  for (std::size_t a = 0; a < mask.size(); ++a) {
+    if (mask[a] == 0) values[a] = -std::numeric_limits<double>::infinity();
   }
 }
 

@@ -137,8 +137,8 @@ class Actions {
   /// Whether a mask allows an action that `draw` returned.
   bool allows_drawn(std::span<const double> action, ActionMask mask) const noexcept {
     for (std::size_t d = 0; d < action.size() && !mask.empty(); ++d) {
-      const ActionMask part = take_part(mask, n_actions_[d]);
-      if (!allows(part, static_cast<std::size_t>(action[d]))) return false;
+      const ActionMask dimension_mask = take_part(mask, n_actions_[d]);
+      if (!allows(dimension_mask, static_cast<std::size_t>(action[d]))) return false;
     }
     return true;
   }

@@ -76,7 +76,7 @@ class ActorCritic : public IndexAgent<ActorCritic> {
   }
 
   const ActorCriticConfig& config() const noexcept { return config_; }
-  /// The critic.
+  /// The critic, as the only network with values, like the networks of other agents.
   std::span<Readout> networks() noexcept { return {&td_.readout(), 1}; }
   std::span<const Readout> networks() const noexcept { return {&td_.readout(), 1}; }
   const Readout& critic() const noexcept { return td_.readout(); }
@@ -247,6 +247,7 @@ class ActorCritic : public IndexAgent<ActorCritic> {
     double trace_dt = 1.0;           ///< that of the one before, see LinearTD
   };
 
+  /// The state of an environment before its first step.
   Episode new_episode() const {
     return {.trace = critic().trace(),
             .actor_trace = actor_.trace(),
@@ -256,6 +257,7 @@ class ActorCritic : public IndexAgent<ActorCritic> {
             .mask = {}};
   }
 
+  /// Lists what is saved of an environment's episode; see core/state.hpp.
   template <class Self, class Listed, class Archive>
   static void serialize_episode(Self& self, Listed& episode, Archive& archive) {
     archive.part("trace", episode.trace);
@@ -277,6 +279,7 @@ class ActorCritic : public IndexAgent<ActorCritic> {
   }
 
   void apply_rates(const auto& /*change*/) { apply_rates(); }
+  /// Sets the learning rates of critic and actor by the schedule, or the one that a caller has set.
   void apply_rates() {
     const auto by_steps = [this](double first, const std::optional<double>& last) {
       return std::max(1, detail::scheduled(first, last.value_or(first), n_learned_,
@@ -289,6 +292,7 @@ class ActorCritic : public IndexAgent<ActorCritic> {
     actor_rate_ = by_steps(config_.actor_learning_rate, config_.final_actor_learning_rate);
   }
 
+  /// Whether the mask allows the action in every dimension.
   bool allows_action(ActionMask mask, Action action) const noexcept {
     for (std::size_t d = 0; d < action.size(); ++d) {
       if (!allows(take_part(mask, n_actions(d)), action[d])) return false;
@@ -314,6 +318,7 @@ class ActorCritic : public IndexAgent<ActorCritic> {
     return workspace.action;
   }
 
+  /// Ends the traces, so that no later reward is credited to past steps.
   static void end(Episode& episode) noexcept {
     episode.trace.clear();
     episode.actor_trace.clear();

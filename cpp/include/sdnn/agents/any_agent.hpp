@@ -187,8 +187,8 @@ inline AnyAgent make_agent(const AnyApproximatorConfig& config, const AnyLearnin
                 "tables", "None where actions have several dimensions", tables.size());
   if (const auto* const rules = std::get_if<FuzzyRulesConfig>(&config)) {
     return FuzzyQLearning(detail::each_dimension(*rules, n_actions, seed,
-                                                 [](const FuzzyRulesConfig& part, std::uint64_t) {
-                                                   return FuzzyRules(part);
+                                                 [](const FuzzyRulesConfig& rules, std::uint64_t) {
+                                                   return FuzzyRules(rules);
                                                  }),
                           std::get<FuzzyQLearningConfig>(learning), seed);
   }
@@ -208,15 +208,15 @@ inline AnyAgent make_agent(const AnyApproximatorConfig& config, const AnyLearnin
   const auto& rule = std::get<QLearningConfig>(learning);
   if (const auto* const rbf = std::get_if<RBFNetworkConfig>(&config)) {
     return QLearning(detail::each_dimension(*rbf, n_actions, seed,
-                                            [](const RBFNetworkConfig& part, std::uint64_t) {
-                                              return RBFNetwork(part);
+                                            [](const RBFNetworkConfig& network, std::uint64_t) {
+                                              return RBFNetwork(network);
                                             }),
                      rule, seed);
   }
-  const auto make = [&](const SDNNCConfig& part, std::uint64_t part_seed) {
-    if (!tables.empty()) return SDNNC(part, tables, part_seed);
-    if (!codes_missing) return SDNNC(part, part_seed);
-    return SDNNC(part, code_books_with_missing(part, part_seed), part_seed);
+  const auto make = [&](const SDNNCConfig& network, std::uint64_t network_seed) {
+    if (!tables.empty()) return SDNNC(network, tables, network_seed);
+    if (!codes_missing) return SDNNC(network, network_seed);
+    return SDNNC(network, code_books_with_missing(network, network_seed), network_seed);
   };
   return QLearning(detail::each_dimension(std::get<SDNNCConfig>(config), n_actions, seed, make),
                    rule, seed);

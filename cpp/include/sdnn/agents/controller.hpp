@@ -154,13 +154,13 @@ class Controller : public WithRates<Controller> {
   std::span<const double> act(std::span<const double> observation, bool explore = true,
                               std::size_t environment = 0, ActionMask mask = {}) {
     actions_.require_mask("mask", mask);
-    const auto held = readings_.filled(observation, environment, !explore, held_);
+    const auto filled = readings_.filled(observation, environment, !explore, held_);
     if (warm_up_) {
       act_at_random(observation, explore, environment, mask);
       readings_.note(held_, environment, !explore);
       return action_;
     }
-    last_states_.read(observations_, environment, held, state_, explore);
+    last_states_.read(observations_, environment, filled, state_, explore);
     std::visit(
         [&](auto& agent) {
           actions_.take(agent.act(state_, explore, environment, mask), action_, indices_);
@@ -195,9 +195,10 @@ class Controller : public WithRates<Controller> {
     find_state(observation, workspace);
     std::visit(
         [&](const auto& agent) {
-          auto& part = part_of(workspace, agent);
-          detail::take_greedy(actions_, agent, agent.best_action(workspace.state, part, ties, mask),
-                              workspace, part);
+          auto& agent_workspace = workspace_of(workspace, agent);
+          detail::take_greedy(actions_, agent,
+                              agent.best_action(workspace.state, agent_workspace, ties, mask),
+                              workspace, agent_workspace);
         },
         *agent_);
     return workspace.action;
@@ -207,22 +208,24 @@ class Controller : public WithRates<Controller> {
   /// stores the state of an observation; `read` evaluates the approximator, in any thread;
   /// `best_of` returns a best allowed action for it. Spans are valid until the next call.
   std::span<const double> prepare(std::span<const double> observation, std::size_t environment) {
-    const auto held = readings_.filled(observation, environment, true, held_);
-    last_states_.read(observations_, environment, held, state_, false);
+    const auto filled = readings_.filled(observation, environment, true, held_);
+    last_states_.read(observations_, environment, filled, state_, false);
     last_states_.keep(observations_, environment, false);
     readings_.note(held_, environment, true);
     return state_;
   }
   void read(std::span<const double> state, Workspace& workspace) const {
-    std::visit([&](const auto& agent) { agent.read(state, part_of(workspace, agent)); }, *agent_);
+    std::visit([&](const auto& agent) { agent.read(state, workspace_of(workspace, agent)); },
+               *agent_);
   }
   std::span<const double> best_of(Workspace& workspace, std::size_t environment,
                                   ActionMask mask = {}) {
     actions_.require_mask("mask", mask);
     std::visit(
         [&](auto& agent) {
-          auto& part = part_of(workspace, agent);
-          detail::take_greedy(actions_, agent, agent.best_of(part, mask), workspace, part);
+          auto& agent_workspace = workspace_of(workspace, agent);
+          detail::take_greedy(actions_, agent, agent.best_of(agent_workspace, mask), workspace,
+                              agent_workspace);
         },
         *agent_);
     last_states_.note_action(environment, workspace.action, false);
@@ -238,7 +241,7 @@ class Controller : public WithRates<Controller> {
     find_state(observation, workspace);
     return std::visit(
         [&](const auto& agent) {
-          return agent.values(workspace.state, part_of(workspace, agent), d, true);
+          return agent.values(workspace.state, workspace_of(workspace, agent), d, true);
         },
         *agent_);
   }
@@ -263,15 +266,15 @@ class Controller : public WithRates<Controller> {
     core::require_in_range("reward", reward, -kLargestReward, kLargestReward);
     require_duration(dt);
     require_environment(environment);
-    const auto held = readings_.filled(observation, next_observation, environment);
+    const auto filled = readings_.filled(observation, next_observation, environment);
     if (warm_up_) {
       remember({false, environment, observation, action, reward, next_observation, terminated,
                 next_mask, warm_up_->has_acted(environment), dt});
       return;
     }
-    last_states_.start(observations_, environment, held.observation, state_);
+    last_states_.start(observations_, environment, filled.observation, state_);
     find_indices(action, environment);
-    last_states_.follow(observations_, environment, action, held.next_observation, next_state_);
+    last_states_.follow(observations_, environment, action, filled.next_observation, next_state_);
     learn_scaled(reward, terminated, environment, next_mask, has_acted(environment), dt);
     readings_.note_step(environment);
     notes_.note(observation);
@@ -374,7 +377,7 @@ class Controller : public WithRates<Controller> {
   }
 
   template <class Agent>
-  static typename Agent::Workspace& part_of(Workspace& workspace, const Agent&) {
+  static typename Agent::Workspace& workspace_of(Workspace& workspace, const Agent&) {
     return std::get<typename Agent::Workspace>(workspace.agent);
   }
 

@@ -94,6 +94,7 @@ class EpsilonGreedy {
     config_.epsilon = epsilon;
   }
 
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.part("exploration", self.exploration_);
@@ -192,11 +193,10 @@ class EpsilonGreedy {
     return i;
   }
 
+  /// The middle of the first longest run of actions with values of at least `least`.
   template <class Value>
   static std::size_t middle_of_widest_run(std::span<const Value> values, Value least) noexcept {
-    std::size_t widest = 0;
-    std::size_t middle = 0;
-    std::size_t run = 0;
+    std::size_t widest = 0, middle = 0, run = 0;
     for (std::size_t action = 0; action < values.size(); ++action) {
       run = values[action] >= least ? run + 1 : 0;
       if (run > widest) {

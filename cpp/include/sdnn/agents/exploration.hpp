@@ -139,6 +139,7 @@ class Exploration {
     return Choice::random;
   }
 
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.part("policy", self.policy_);
@@ -159,6 +160,7 @@ class Exploration {
       archive.expect(self.n_ended_ >= 0 && self.n_ended_ <= kMostEnded, "n_ended", "in [0, 20]");
     }
   }
+  /// Lists what is saved of an environment's episode; see core/state.hpp.
   template <class Listed, class Archive, class NActions>
   void serialize_episode(Listed& episode, Archive& archive, const NActions& n_actions) const {
     archive.number("step", episode.step);

@@ -51,8 +51,7 @@ class FuzzyQLearning {
   /// The memory of one reader: the rules that fire in a state, for each dimension.
   struct Workspace {
     std::vector<approximators::FiredRules> fired;
-    std::vector<double> values;
-    std::vector<double> action;
+    std::vector<double> values, action;
   };
 
   /// Takes the rules of each dimension of actions. Throws std::invalid_argument naming the field
@@ -173,6 +172,7 @@ class FuzzyQLearning {
       dimensions_[d].rules().fire(state, workspace.fired[d]);
     }
   }
+  /// The greedy action in the state that was read into the workspace.
   Action best_of(Workspace& workspace, ActionMask /*mask*/ = {}) {
     for (std::size_t d = 0; d < n_dimensions(); ++d) {
       workspace.action[d] =
@@ -205,6 +205,7 @@ class FuzzyQLearning {
     }
   }
 
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     if (self.n_dimensions() == 1) {

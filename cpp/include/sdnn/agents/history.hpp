@@ -282,6 +282,7 @@ class HistoryFilter {
     return experience;
   }
 
+  /// Selects the history that the random experience needs: against noise, of velocities, or none.
   History found_kind(const RandomExperience& numbers) const {
     if (observer_.gain() < 1.0 && observer_.improvement() >= kLeastImprovement) {
       return History::observer;

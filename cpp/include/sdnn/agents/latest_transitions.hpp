@@ -34,6 +34,7 @@ class LatestTransitions {
   const WarmUp& transitions() const noexcept { return latest_; }
   void forget() { latest_ = empty_; }
 
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.number("n_seen", self.n_seen_);

@@ -22,10 +22,10 @@ class NStepBuffer {
   struct Step {
     std::vector<double> state;
     std::vector<std::size_t> action;
-    double reward = 0.0;
-    double dt = 1.0;
+    double reward = 0.0, dt = 1.0;
   };
 
+  /// Allocates all steps, so that adding one allocates nothing.
   NStepBuffer(std::size_t n_steps, std::size_t n_inputs, std::size_t n_dimensions)
       : steps_(n_steps), next_state_(n_inputs) {
     for (Step& step : steps_) {
@@ -84,6 +84,7 @@ class NStepBuffer {
     return true;
   }
 
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     std::vector<double> states;

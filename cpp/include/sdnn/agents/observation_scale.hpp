@@ -52,8 +52,9 @@ struct ObservedInput {
 /// of its variables is.
 class ObservationScale {
  public:
-  /// Shapes: low and high (n_observed,), n_bins (n_inputs,) with Missing::code. Throws
-  /// std::invalid_argument naming what does not fit.
+  /// Takes the ranges of the variables, and how inputs are made of them. Shapes: low and high
+  /// (n_observed,), n_bins (n_inputs,) with Missing::code. Throws std::invalid_argument naming what
+  /// does not fit.
   ObservationScale(std::vector<double> low, std::vector<double> high,
                    std::vector<ObservedInput> inputs, Missing missing = Missing::error,
                    std::vector<std::size_t> n_bins = {})

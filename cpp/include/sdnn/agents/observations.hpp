@@ -397,6 +397,7 @@ class Observations {
     return inputs;
   }
 
+  /// Replaces ranges and angle pairs, and the inputs that follow from them.
   void take(const Ranges& ranges, const Pairs& pairs) {
     ObservationScale(ranges.low, ranges.high, {});  // throws before anything changes
     ranges_ = ranges;
@@ -406,6 +407,7 @@ class Observations {
     take_inputs(inputs_with(pairs));
   }
 
+  /// Replaces the inputs; the last is repeated if the approximator needs more of them.
   void take_inputs(std::vector<ObservedInput> inputs) {
     const std::size_t least = repeats_input_ ? least_inputs_ : 1;
     while (!inputs.empty() && inputs.size() < least) inputs.push_back(inputs.back());

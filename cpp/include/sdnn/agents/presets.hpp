@@ -75,6 +75,7 @@ using NamedPreset = Named<Preset>;
 using NamedQLambdaPreset = Named<QLambdaPreset>;
 using NamedActorCriticPreset = Named<ActorCriticPreset>;
 
+/// The presets of SDNN-C, by name.
 inline std::array<NamedPreset, 4> presets(int n_inputs) {
   return {{{"paper", "as in the paper", paper_preset(n_inputs)},
            {"general", "as recommended for any task", general_preset(n_inputs)},

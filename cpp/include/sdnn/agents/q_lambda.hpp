@@ -231,6 +231,7 @@ class QLambda : public IndexAgent<QLambda> {
     apply_rates();
   }
 
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.part("action_value", self.td_.readout());
@@ -284,6 +285,7 @@ class QLambda : public IndexAgent<QLambda> {
 
   using Episode = detail::QLambdaEpisode;
 
+  /// The state of an environment before its first step.
   Episode new_episode() const {
     return {.trace = readout().trace(),
             .present = readout().workspace(),
@@ -383,6 +385,7 @@ class QLambda : public IndexAgent<QLambda> {
     }));
   }
 
+  /// Ends the trace, so that no later reward is credited to past steps.
   static void end(Episode& episode) noexcept {
     episode.trace.clear();
     episode.old_value = 0;

@@ -181,6 +181,7 @@ class QLearning : public IndexAgent<QLearning<Q>> {
     }
   }
 
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     if (self.n_dimensions() == 1) {
@@ -220,6 +221,7 @@ class QLearning : public IndexAgent<QLearning<Q>> {
     ReturnRange::Rewards rewards = {};
   };
 
+  /// The state of an environment before its first step.
   Episode new_episode() const {
     return {NStepBuffer(static_cast<std::size_t>(config_.n_steps), n_inputs(), n_dimensions()),
             {},
@@ -227,6 +229,7 @@ class QLearning : public IndexAgent<QLearning<Q>> {
             adapts_range() ? range_.no_rewards() : ReturnRange::Rewards{}};
   }
 
+  /// Lists what is saved of an environment's episode; see core/state.hpp.
   template <class Self, class Listed, class Archive>
   static void serialize_episode(Self& self, Listed& episode, Archive& archive) {
     archive.part("n_step_buffer", episode.buffer);
@@ -256,6 +259,8 @@ class QLearning : public IndexAgent<QLearning<Q>> {
     return kHasRange && config_.value_range == ValueRange::adaptive;
   }
 
+  /// Returns the networks of all dimensions; throws std::invalid_argument unless they have the same
+  /// inputs.
   static std::vector<Q> of_same_inputs(std::vector<Q> networks) {
     core::require(!networks.empty(), "networks", "at least one", networks.size());
     const std::size_t n = networks.front().n_inputs();
@@ -319,6 +324,7 @@ class QLearning : public IndexAgent<QLearning<Q>> {
     return workspace.action;
   }
 
+  /// The value of a state: the mean over dimensions of the best value of an allowed action.
   double state_value(std::span<const double> state, ActionMask mask) {
     double sum = 0.0;
     for (std::size_t d = 0; d < n_dimensions(); ++d) {

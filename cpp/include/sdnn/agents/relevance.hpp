@@ -172,6 +172,7 @@ class Relevance {
     return values;
   }
 
+  /// The change of input i in each transition; of an angle, the shorter way.
   std::vector<double> changes_of(std::size_t i) const {
     const std::vector<double> before = column(experience_.states, i);
     std::vector<double> changes = column(experience_.next_states, i);
@@ -182,6 +183,7 @@ class Relevance {
     return changes;
   }
 
+  /// The discounted sum of the next kRewards rewards of each transition, up to the episode's end.
   std::vector<double> sums_of_rewards() const {
     std::vector<double> sums(experience_.size());
     for (std::size_t t = 0; t < sums.size(); ++t) {
@@ -195,7 +197,7 @@ class Relevance {
     return sums;
   }
 
-  /// Bins of about equal counts; equal values share one.
+  /// The bin of each value. Bins have about equal counts of values, and equal values share one.
   static std::vector<std::uint8_t> binned(const std::vector<double>& values) {
     std::vector<double> sorted = values;
     std::ranges::sort(sorted);
@@ -225,9 +227,7 @@ class Relevance {
   /// and bin t of `beside`.
   static double f_statistic(const std::vector<double>& values, const Bins& bins, std::size_t shift,
                             const Bins* beside) {
-    double sums[kMostBins] = {};
-    double counts[kMostBins] = {};
-    double total = 0.0;
+    double sums[kMostBins] = {}, counts[kMostBins] = {}, total = 0.0;
     const std::size_t n = values.size();
     for (std::size_t t = 0, s = shift; t < n; ++t, ++s) {
       if (s == n) s = 0;
@@ -239,8 +239,7 @@ class Relevance {
     const double mean = total / static_cast<double>(n);
     double square = 0.0;
     for (const double value : values) square += (value - mean) * (value - mean);
-    double between = 0.0;
-    double n_bins = 0.0;
+    double between = 0.0, n_bins = 0.0;
     for (std::size_t b = 0; b < kMostBins; ++b) {
       if (counts[b] == 0.0) continue;
       const double difference = sums[b] / counts[b] - mean;
@@ -273,8 +272,7 @@ class Relevance {
 
   /// The rest of the values without the means of the bins.
   static std::vector<double> without_means(std::vector<double> values, const Bins& bins) {
-    double sums[kMostBins] = {};
-    double counts[kMostBins] = {};
+    double sums[kMostBins] = {}, counts[kMostBins] = {};
     for (std::size_t t = 0; t < values.size(); ++t) {
       sums[bins[t]] += values[t];
       counts[bins[t]] += 1.0;

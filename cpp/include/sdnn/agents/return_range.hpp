@@ -71,6 +71,7 @@ class ReturnRange {
     return follow() || grows;
   }
 
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.number("low", self.low_);
@@ -94,6 +95,7 @@ class ReturnRange {
       self.returns_.reserve(kMostReturns);
     }
   }
+  /// Lists what is saved of an environment's rewards; see core/state.hpp.
   template <class Listed, class Archive>
   void serialize_rewards(Listed& rewards, Archive& archive) const {
     const auto first = rewards.waiting.begin();

@@ -71,6 +71,7 @@ class RewardScale {
   /// The first reward that was refused, and its number, from 1. It is for a warning, and not saved.
   std::optional<std::pair<double, std::uint64_t>> refused() const noexcept { return refused_; }
 
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.number("size", self.size_);

@@ -68,6 +68,7 @@ constexpr auto schedule_fields() noexcept {
 
 namespace detail {
 
+/// The scheduled value at a progress in [0, 1], between the first value and the last.
 inline double scheduled(double first, const std::optional<double>& last, Schedule schedule,
                         double progress) noexcept {
   if (!last) return first;
@@ -97,6 +98,7 @@ double learning_rate_at(const Config& config, double progress) noexcept {
   }
   return config.learning_rate;
 }
+/// Epsilon at a progress in [0, 1]; 0 for agents without epsilon.
 template <class Config>
 double epsilon_at(const Config& config, double progress) noexcept {
   if constexpr (requires { config.policy; }) {
@@ -162,6 +164,7 @@ class WithRates {
     rates_.set_learning_rate = rate;
     apply([rate](auto& other) { other.set_learning_rate(rate); });
   }
+  /// Fixes epsilon, or lets it follow the schedule again if there is no value.
   void set_epsilon(std::optional<double> epsilon) {
     const double tried = epsilon.value_or(0.0);
     core::require(tried >= 0.0 && tried <= 1.0, "epsilon", "in [0, 1], or None", tried);
@@ -175,6 +178,7 @@ class WithRates {
   }
 
  protected:
+  /// Lists what is saved of the rates; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize_rates(Self& self, Archive& archive) {
     auto& rates = self.rates_;

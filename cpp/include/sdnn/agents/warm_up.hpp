@@ -51,7 +51,7 @@ class WarmUp {
         episodes_({Episode(n_dimensions)}) {}
 
   std::size_t n_environments() const noexcept { return episodes_.size(); }
-  /// Throws std::invalid_argument outside [1, 2^14].
+  /// Adds or removes environments at the end. Throws std::invalid_argument outside [1, 2^14].
   void set_n_environments(std::size_t n) {
     episodes_.resize(n, [this] { return Episode(n_dimensions_); });
   }
@@ -68,7 +68,8 @@ class WarmUp {
     return size() >= n_steps_ && std::ranges::none_of(episodes_, &Episode::acted);
   }
 
-  /// Throws std::invalid_argument if there is no such environment.
+  /// Begins an episode: no action of the last one is repeated. Throws std::invalid_argument if
+  /// there is no such environment.
   void begin_episode(std::size_t environment) {
     Episode& episode = episodes_.of(environment);
     episode.begins = true;
@@ -144,6 +145,7 @@ class WarmUp {
             dts_.empty() ? 1.0 : dts_[t]};
   }
 
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.numbers("observations", self.observations_);

@@ -30,6 +30,8 @@ struct DistanceOf {
   std::int32_t offset;
 };
 
+/// The first unit with the smallest distance below 2^31, or `size` if there is none. Units that
+/// must not be selected have larger distances; see DistanceOf.
 inline std::size_t nearest_unit_portable(const std::int32_t* potentials, std::size_t size,
                                          const DistanceOf& of) noexcept {
   std::uint32_t nearest = std::uint32_t{1} << 31;

@@ -152,7 +152,7 @@ class HiddenLayer {
   bool has_room(std::size_t unit, const coding::SignedColumns& input, std::int32_t step,
                 std::int32_t limit) const {
     return largest_weight_[unit] + growth(step) <= limit ||
-           fits(unit, parts_of(input, step), limit);
+           fits(unit, changes_of(input, step), limit);
   }
 
   /// Adds step * x to w_i, twice as much in double columns, and subtracts step from w_i0, for every
@@ -163,13 +163,12 @@ class HiddenLayer {
   /// would leave its range. Requires |step| <= 64. It is fastest for `units` in rising order.
   void update(std::span<const std::uint32_t> units, const coding::SignedColumns& input,
               std::int32_t step) {
-    const std::array<Part, 4> parts = parts_of(input, step);
-    for (const std::uint32_t unit : units) require_room(unit, parts, step);
+    const std::array<ColumnChange, 4> changes = changes_of(input, step);
+    for (const std::uint32_t unit : units) require_room(unit, changes, step);
     for (std::size_t k = 0; k < units.size();) {  // neighbours in a block share its cache lines
       const std::size_t block = units[k] / kBlockUnits;
       detail::Bytes mask{};
-      std::size_t n_changed = 0;
-      std::size_t changed = 0;
+      std::size_t n_changed = 0, changed = 0;
       for (; k < units.size() && units[k] / kBlockUnits == block; ++k) {
         const std::size_t unit = units[k];
         raise_bound(unit, growth(step));
@@ -179,12 +178,12 @@ class HiddenLayer {
           changed = unit;
           ++n_changed;
         } else {
-          for (const Part& part : parts) add_with_high_bytes(unit, part);
+          for (const ColumnChange& change : changes) add_with_high_bytes(unit, change);
         }
       }
-      for (const Part& part : parts) {
-        if (n_changed == 1) add_to_unit(changed, part);
-        if (n_changed > 1) add_to_units(block, part, mask);
+      for (const ColumnChange& change : changes) {
+        if (n_changed == 1) add_to_unit(changed, change);
+        if (n_changed > 1) add_to_units(block, change, mask);
       }
     }
   }
@@ -251,12 +250,15 @@ class HiddenLayer {
   }
 
   /// The columns of an input whose weights a correction changes equally.
-  struct Part {
+  struct ColumnChange {
     std::span<const std::uint32_t> columns;
-    std::int32_t change;
+    std::int32_t amount;
   };
 
-  std::array<Part, 4> parts_of(const coding::SignedColumns& input, std::int32_t step) const {
+  /// Splits the columns of an input by the change of their weights: double columns change twice as
+  /// much, and those with a minus sign by the negative.
+  std::array<ColumnChange, 4> changes_of(const coding::SignedColumns& input,
+                                         std::int32_t step) const {
     const auto split = [this](std::span<const std::uint32_t> columns) {
       const auto end = std::partition_point(columns.begin(), columns.end(),
                                             [this](std::uint32_t j) { return j < n_double_; });
@@ -275,24 +277,25 @@ class HiddenLayer {
     return std::abs(step) * (n_double_ > 0 ? 2 : 1);
   }
 
-  void add_to_unit(std::size_t unit, const Part& part) noexcept {
+  /// Adds the change to the low bytes of a unit's weights, which must not overflow.
+  void add_to_unit(std::size_t unit, const ColumnChange& change) noexcept {
     std::int8_t* const lane = bytes_.data() + byte_index(unit, 0);
-    for (const std::uint32_t column : part.columns) {
+    for (const std::uint32_t column : change.columns) {
       std::int8_t& weight = lane[std::size_t{column} * kBlockUnits];
-      weight = static_cast<std::int8_t>(weight + part.change);
+      weight = static_cast<std::int8_t>(weight + change.amount);
     }
   }
 
   /// Adds to the units of the block whose mask is -1, modulo 256: the result fits by the bounds.
-  void add_to_units(std::size_t block, const Part& part, detail::Bytes mask) noexcept {
-    for (std::int8_t& byte : mask) byte = static_cast<std::int8_t>(byte & part.change);
-    add_to_columns(bytes_.data() + block * block_bytes(), part.columns.data(), part.columns.size(),
-                   mask);
+  void add_to_units(std::size_t block, const ColumnChange& change, detail::Bytes mask) noexcept {
+    for (std::int8_t& byte : mask) byte = static_cast<std::int8_t>(byte & change.amount);
+    add_to_columns(bytes_.data() + block * block_bytes(), change.columns.data(),
+                   change.columns.size(), mask);
   }
 
-  void add_with_high_bytes(std::size_t unit, const Part& part) noexcept {
-    for (const std::uint32_t column : part.columns) {
-      store(unit, column, bytes_[byte_index(unit, column)] + part.change);
+  void add_with_high_bytes(std::size_t unit, const ColumnChange& change) noexcept {
+    for (const std::uint32_t column : change.columns) {
+      store(unit, column, bytes_[byte_index(unit, column)] + change.amount);
     }
   }
 
@@ -308,6 +311,7 @@ class HiddenLayer {
     bytes_[at] = static_cast<std::int8_t>(value);
   }
 
+  /// Sets the second byte of a weight, also in the list of second bytes that are not 0.
   void set_high_byte(std::size_t unit, std::size_t column, std::int32_t value) noexcept {
     std::int8_t& byte = high_bytes_[byte_index(unit, column)];
     const HighByte high{static_cast<std::uint32_t>(column),
@@ -339,10 +343,10 @@ class HiddenLayer {
   /// Throws unless the correction keeps the unit in range. The stored bound of a unit only grows,
   /// so the true maximum is computed when the bound reaches the limit, and the corrected weights
   /// when the maximum does: a correction towards 0 is always possible.
-  void require_room(std::size_t unit, std::span<const Part> parts, std::int32_t step) {
+  void require_room(std::size_t unit, std::span<const ColumnChange> changes, std::int32_t step) {
     const std::int32_t room = weight_limit_ - growth(step);
     if (largest_weight_[unit] > room) largest_weight_[unit] = largest_weight(unit);
-    if ((largest_weight_[unit] > room && !fits(unit, parts, weight_limit_)) ||
+    if ((largest_weight_[unit] > room && !fits(unit, changes, weight_limit_)) ||
         std::abs(thresholds_[unit] - step) > kThresholdLimit) {
       core::fail(std::overflow_error(
           "a weight or threshold of hidden unit " + std::to_string(unit) +
@@ -350,10 +354,11 @@ class HiddenLayer {
     }
   }
 
-  bool fits(std::size_t unit, std::span<const Part> parts, std::int32_t limit) const {
-    return std::ranges::all_of(parts, [&](const Part& part) {
-      return std::ranges::all_of(part.columns, [&](std::uint32_t j) {
-        return std::abs(weight(unit, j) + part.change) <= limit;
+  /// Whether all changed weights of a unit would be at most `limit` in size.
+  bool fits(std::size_t unit, std::span<const ColumnChange> changes, std::int32_t limit) const {
+    return std::ranges::all_of(changes, [&](const ColumnChange& change) {
+      return std::ranges::all_of(change.columns, [&](std::uint32_t j) {
+        return std::abs(weight(unit, j) + change.amount) <= limit;
       });
     });
   }

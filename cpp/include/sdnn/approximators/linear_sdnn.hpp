@@ -115,6 +115,7 @@ class LinearSDNN {
   /// The exponent of the unit of values, 2^exponent; none before the first reward that is not 0.
   std::optional<std::int32_t> exponent() const noexcept { return exponent_; }
 
+  /// Makes the memory of one reader, so that reading allocates nothing.
   Workspace workspace() const {
     Workspace workspace;
     workspace.code_.signs_.resize(n_slots());
@@ -341,6 +342,7 @@ class LinearSDNN {
     std::ranges::fill(versions_, ++version_);
   }
 
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.fixed("weights", {self.n_rows_, self.n_slots()}, self.weights_);
@@ -367,8 +369,7 @@ class LinearSDNN {
 
  private:
   struct Dimension {
-    std::size_t n_actions;
-    std::size_t first_row;
+    std::size_t n_actions, first_row;
   };
 
   static constexpr std::int32_t kLeastExponent = -1074;  // the exponent of the smallest number
@@ -417,8 +418,7 @@ class LinearSDNN {
   /// Moves the average towards the weights by 1 / 2^k of the way, about 3 / (n + 3) after n steps.
   void note_step() noexcept {
     if (++n_steps_ % config_.averaging_interval != 0) return;
-    const int k =
-        static_cast<int>(std::bit_width(static_cast<std::uint64_t>(n_snapshots_ / 3 + 1))) - 1;
+    const int k = static_cast<int>(std::bit_width(std::uint64_t(n_snapshots_ / 3 + 1))) - 1;
     const std::int32_t half = k > 0 ? 1 << (k - 1) : 0;
     for (std::size_t j = 0; j < weights_.size(); ++j) {
       averaged_[j] += (weights_[j] - averaged_[j] + half) >> k;
@@ -439,8 +439,7 @@ class LinearSDNN {
   std::vector<std::uint64_t> versions_;  ///< versions of the rows of weights
   std::uint64_t version_ = 1;            ///< the latest version
   std::optional<std::int32_t> exponent_;
-  std::int64_t n_steps_ = 0;
-  std::int64_t n_snapshots_ = 0;
+  std::int64_t n_steps_ = 0, n_snapshots_ = 0;
   core::Identity identity_;
 };
 

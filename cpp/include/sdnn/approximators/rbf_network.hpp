@@ -189,6 +189,7 @@ class RBFNetwork {
   static constexpr double kLargestStep = 1e305;
   static constexpr double kLargestWeight = 1e300;  // limit of given weights, whose sums stay finite
 
+  /// Returns the configuration if it is valid and its tables fit into memory; throws otherwise.
   static RBFNetworkConfig checked(const RBFNetworkConfig& config) {
     core::check_fields(config);
     core::require_table_bytes("n_actions or n_bases", "the bases of all actions",

@@ -68,6 +68,7 @@ class SDNNC {
    private:
     friend class SDNNC;
 
+    /// Makes the memory of one reader of the network.
     explicit Workspace(const SDNNC& network)
         : cache_(network.state_code(), network.actions_.n_hidden_units()),
           bins_(network.n_inputs()),
@@ -75,6 +76,7 @@ class SDNNC {
       selected_.reserve(network.actions_.n_active_units());
     }
 
+    /// The cache of the averaged network, which is made when it is first used.
     ActivationCache& averaged_cache(const SDNNC& network) {
       if (!averaged_cache_) {
         averaged_cache_.emplace(network.state_code(), network.actions_.n_hidden_units());
@@ -252,6 +254,7 @@ class SDNNC {
     tabulate_values();
   }
 
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     const std::size_t n_units = self.hidden_layer_.n_units();
@@ -298,6 +301,8 @@ class SDNNC {
 
   static constexpr std::uint64_t kMostErrors = 1000;  // averaged errors
 
+  /// The scale between firing units and values. By default, as in the paper, the lowest and the
+  /// highest fifteenth of the counts are not used.
   static OutputScale make_scale(const SDNNCConfig& config) {
     const int u_low = config.u_low.value_or(config.n_active_units / 15);
     core::require_in_range("u_low", u_low, 0, config.n_active_units);
@@ -306,6 +311,7 @@ class SDNNC {
     return {u_low, u_high, config.q_low, config.q_high};
   }
 
+  /// Tabulates the value of each number of firing units.
   void tabulate_values() {
     value_of_count_.resize(actions_.n_active_units() + 1);
     for (std::size_t u = 0; u < value_of_count_.size(); ++u) {
@@ -314,8 +320,9 @@ class SDNNC {
     values_rise_ = std::ranges::is_sorted(value_of_count_);
   }
 
-  /// Shapes: weights (n, D), in the paper's order, thresholds (n,). Throws std::invalid_argument
-  /// for a weight or threshold out of range; then nothing has changed.
+  /// Takes weights and thresholds of the code before pairing. Shapes: weights (n, D), in the
+  /// paper's order, thresholds (n,). Throws std::invalid_argument for a weight or threshold out of
+  /// range; then nothing has changed.
   template <class Weight>
   void replace_parameters(std::span<Weight> weights, std::span<const std::int32_t> thresholds) {
     const std::size_t n_columns = code_->n_columns();
@@ -335,6 +342,7 @@ class SDNNC {
            workspace.counts_.of_actions().size() == n_actions();
   }
 
+  /// Writes the values of all actions, of the averaged or of the present weights.
   void fill_values(std::span<const double> state, Workspace& workspace, std::span<double> out,
                    bool averaged) const {
     core::require_size("out", out.size(), n_actions());
@@ -352,7 +360,8 @@ class SDNNC {
     });
   }
 
-  /// Corrects the error, after the arguments have been checked.
+  /// Makes units fire or not, so that Q(state, action) moves towards the target, and counts the
+  /// outcome. The arguments have been checked.
   void correct(std::span<const double> state, Workspace& workspace, std::size_t action,
                double target, double rate) {
     const Cached entry = recall(state, workspace);
@@ -412,6 +421,7 @@ class SDNNC {
                                              : std::floor(exact + kNothing));
   }
 
+  /// The number of firing units in an action's window.
   int count_in_window(std::span<const std::int32_t> potentials, std::size_t action) const {
     core::require_below("action", action, n_actions());
     const std::size_t first = actions_.first_unit(action);

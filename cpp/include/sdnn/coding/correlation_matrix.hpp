@@ -31,6 +31,7 @@ inline void prefetch([[maybe_unused]] const void* address) noexcept {
 /// Patterns as bytes, whose inner products are moved towards given ones by swaps of two units.
 class CorrelationSearch {
  public:
+  /// Takes the required correlations as inner products of signs, which are integers.
   CorrelationSearch(std::span<const double> correlations, std::size_t n_bins, std::size_t n_units)
       : n_bins_(n_bins),
         n_units_(n_units),

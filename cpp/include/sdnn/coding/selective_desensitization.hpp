@@ -109,7 +109,7 @@ SDNN_KERNEL(std::int32_t, gated_product,
 class SelectiveDesensitization {
  public:
   /// Takes a table from each list for every pair. Consecutive pairs with the same modifier table
-  /// form a gate.
+  /// form a gate, so that inner products read this table once.
   ///
   /// Throws std::invalid_argument if the lists differ in length or are empty, if the tables differ
   /// in n_units, or if two tables of one input differ in n_bins.
@@ -219,6 +219,7 @@ class SelectiveDesensitization {
   }
 
  private:
+  /// Moves tables into shared ownership, since a table is often used by several pairs.
   static SharedTables shared(std::vector<PatternTable> tables) {
     SharedTables result;
     for (PatternTable& table : tables) {
@@ -236,6 +237,7 @@ class SelectiveDesensitization {
     return most;
   }
 
+  /// Checks that all tables have the same units, and those of one input the same bins.
   void note_input(std::size_t input, const PatternTable& table) {
     core::require(input < (std::size_t{1} << 20), "pairs", "inputs below 2^20", input);
     core::require(table.n_units() == n_units(), "tables", "all of one n_units", table.n_units());

@@ -98,8 +98,7 @@ class StateCode {
   /// and its weight is half of this sum of their weights; otherwise both are those of `first`.
   struct PairedColumns {
     bool paired;
-    std::size_t first;
-    std::size_t second;
+    std::size_t first, second;
     int sign;
   };
 
@@ -108,8 +107,7 @@ class StateCode {
     core::require_below("unit", unit, n_columns());
     const std::size_t m = n_pattern_units();
     const std::size_t group = unit / m;
-    const std::size_t nu = groups_[group].modifier;
-    const std::size_t modifier = permutations_[group][unit % m];
+    const std::size_t nu = groups_[group].modifier, modifier = permutations_[group][unit % m];
     const std::size_t rank = ranks_[group];
     const std::size_t pair = rank / 2;
     if (pair == n_pairs()) return {false, n_double_columns() + nu * m + modifier, 0, 0};
@@ -124,8 +122,7 @@ class StateCode {
     const std::size_t width = code_.n_pair_words();
     for (std::size_t first = 0; first < 2 * n_inputs() * n_pairs() * width; first += 2 * width) {
       for (std::size_t w = first; w < first + width; ++w) {
-        const std::uint64_t first_sign = positive[w];
-        const std::uint64_t second_sign = positive[w + width];
+        const std::uint64_t first_sign = positive[w], second_sign = positive[w + width];
         const std::uint64_t unlike = first_sign ^ second_sign;
         active[w] ^= unlike;  // half of the sum where the signs are equal
         positive[w] = first_sign & second_sign;
@@ -150,6 +147,7 @@ class StateCode {
     return strides;
   }
 
+  /// The ordered pairs of inputs at the distances `strides` in the circle of inputs, sorted.
   std::vector<InputPair> list_groups() const {
     for (std::size_t i = 0; i < strides_.size(); ++i) {
       core::require(strides_[i] > (i == 0 ? 0 : strides_[i - 1]) && strides_[i] < n_inputs(),
@@ -167,8 +165,7 @@ class StateCode {
 
   /// For each group, the number of groups before it with the same modifier.
   std::vector<std::size_t> rank_groups() const {
-    std::vector<std::size_t> n_before(n_inputs(), 0);
-    std::vector<std::size_t> ranks;
+    std::vector<std::size_t> n_before(n_inputs(), 0), ranks;
     for (const InputPair& pair : groups_) ranks.push_back(n_before[pair.modifier]++);
     return ranks;
   }
@@ -192,8 +189,7 @@ class StateCode {
     core::require(permutations_.size() == n_groups(), "number of permutations",
                   "n_inputs times the number of strides", permutations_.size());
     for (const Permutation& sigma : permutations_) require_permutation(sigma, n_pattern_units());
-    SharedTables modified;
-    SharedTables modifiers;
+    SharedTables modified, modifiers;
     std::vector<InputPair> pairs;
     std::vector<std::size_t> order(n_groups());
     std::iota(order.begin(), order.end(), 0);

@@ -116,6 +116,7 @@ inline std::string words_of(const Bounds& bounds, bool is_whole) {
   return words.str();
 }
 
+/// Throws ArgumentError unless the value, or each item of a list, is within its bounds.
 template <class Value>
 void check_bounds(const char* name, const Value& value, const Bounds& bounds) {
   if constexpr (std::is_same_v<Value, bool> || std::is_enum_v<Value>) {

@@ -93,6 +93,7 @@ inline InstructionSet instruction_set_named(std::string_view name) {
 
 namespace detail {
 
+/// The instruction set in use: the one that SDNN_INSTRUCTION_SET names, or the processor's best.
 inline std::atomic<InstructionSet>& active_level() {
   static std::atomic<InstructionSet> level = [] {
     const char* const requested = std::getenv("SDNN_INSTRUCTION_SET");

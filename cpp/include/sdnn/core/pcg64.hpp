@@ -22,6 +22,7 @@ namespace sdnn::core {
 /// alternative; numpy/random/src/distributions/distributions.c (bounded integers after Lemire).
 class Pcg64 {
  public:
+  /// Seeds like NumPy's PCG64(SeedSequence(seeds)).
   explicit Pcg64(std::span<const std::uint64_t> seeds) noexcept {
     std::vector<std::uint32_t> words;  // integers in the form of NumPy, without leading zeros
     for (const std::uint64_t seed : seeds) {
@@ -56,6 +57,7 @@ class Pcg64 {
     return static_cast<std::uint32_t>(scaled >> 32U);
   }
 
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     std::array<std::uint64_t, 6> words{self.state_.high,    self.state_.low, self.increment_.high,
@@ -114,6 +116,7 @@ class Pcg64 {
     return {a.high + b.high + (low < a.low ? 1U : 0U), low};
   }
 
+  /// The product of two numbers of 64 bits, in 128 bits.
   static Wide product(std::uint64_t a, std::uint64_t b) noexcept {
     constexpr std::uint64_t kHalf = 0xffffffff;
     const std::uint64_t a_low = a & kHalf, a_high = a >> 32U, b_low = b & kHalf, b_high = b >> 32U;
@@ -122,6 +125,7 @@ class Pcg64 {
     return {a_high * b_high + (second >> 32U) + (third >> 32U), (third << 32U) | (first & kHalf)};
   }
 
+  /// Advances the state, state = state * factor + increment modulo 2^128.
   void advance() noexcept {
     // The default multiplier of PCG with 128 bits.
     constexpr Wide kFactor{2549297995355413924U, 4865540595714422341U};

@@ -48,6 +48,7 @@ class Random {
     for (auto& word : state_) word = split_mix(mixed);
   }
 
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.fixed("words", {self.state_.size()}, self.state_);

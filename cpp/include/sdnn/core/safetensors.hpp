@@ -76,9 +76,9 @@ inline constexpr std::uint64_t kLargestFile =
 // Tensors that a file may have in addition to one for every two bytes of data.
 inline constexpr std::uint64_t kMostEmptyTensors = 1024;
 
-inline std::size_t count_of(std::string_view text, std::string_view part) {
+inline std::size_t count_of(std::string_view text, std::string_view word) {
   std::size_t n = 0;
-  for (auto at = text.find(part); at != text.npos; at = text.find(part, at + part.size())) ++n;
+  for (auto at = text.find(word); at != text.npos; at = text.find(word, at + word.size())) ++n;
   return n;
 }
 
@@ -93,6 +93,8 @@ inline void expect_of_file(bool holds, const std::string& what) {
   if (!holds) throw std::runtime_error(what);
 }
 
+/// Reads type, shape and range of bytes of a tensor from its entry in the header, which may be
+/// damaged. Throws std::runtime_error naming the problem.
 inline TensorPlace tensor_place(const std::string& name, const nlohmann::json& entry,
                                 std::uint64_t n_bytes) {
   const auto expect = [&name](bool holds, const char* what) {
@@ -197,15 +199,15 @@ inline std::string digits_of(std::uint32_t crc) {
 /// The checksum of all bytes of a file of `size` bytes except its own.
 template <class Read>
 std::string checksum_of(std::uint64_t size, const Read& read) {
-  std::vector<std::byte> piece(std::size_t{1} << 16);
+  std::vector<std::byte> buffer(std::size_t{1} << 16);
   std::uint32_t crc = 0;
   const auto add = [&](std::uint64_t begin, std::uint64_t end) {
     while (begin < end) {
-      const auto part = std::span(piece).first(
-          static_cast<std::size_t>(std::min<std::uint64_t>(piece.size(), end - begin)));
-      read(begin, part);
-      crc = crc32(part, crc);
-      begin += part.size();
+      const auto bytes = std::span(buffer).first(
+          static_cast<std::size_t>(std::min<std::uint64_t>(buffer.size(), end - begin)));
+      read(begin, bytes);
+      crc = crc32(bytes, crc);
+      begin += bytes.size();
     }
   };
   add(0, kChecksumBegin);
@@ -213,7 +215,7 @@ std::string checksum_of(std::uint64_t size, const Read& read) {
   return digits_of(crc);
 }
 
-/// A file whose checksum has been compared.
+/// Reads a file, whose checksum is compared first. Throws std::runtime_error if it is not whole.
 inline Safetensors read_checked(const std::filesystem::path& path) {
   RegularFile file(path);
   const auto read = [&file](std::uint64_t begin, std::span<std::byte> into) {

@@ -222,9 +222,9 @@ class StateReader : public detail::Nested<StateReader> {
   std::size_t n_numbered(std::string_view name) const {
     std::size_t n = 0;
     for (;; ++n) {
-      const std::string part = prefix + std::string(name) + "." + std::to_string(n + 1) + ".";
-      const auto found = state_.lower_bound(part);
-      if (found == state_.end() || !found->first.starts_with(part)) return n;
+      const std::string beginning = prefix + std::string(name) + "." + std::to_string(n + 1) + ".";
+      const auto found = state_.lower_bound(beginning);
+      if (found == state_.end() || !found->first.starts_with(beginning)) return n;
     }
   }
 

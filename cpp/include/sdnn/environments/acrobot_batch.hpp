@@ -175,10 +175,10 @@ class AcrobotBatch {
   void move_all(std::span<const std::uint8_t> moving) {
     constexpr double kStepsPerPoint = 1 << 20;  // these take a fraction of a second
     const double steps = std::nearbyint(config().decision_interval / config().integration_step);
-    const std::size_t part =
+    const std::size_t n_at_once =
         core::round_up(static_cast<std::size_t>(kStepsPerPoint / steps) + 1, kAcrobotLanes);
     for (std::size_t i = 0; i < size_; ++i) over_[i] = over_[i] || moving[i];  // undone if all move
-    for (std::size_t first = 0; first < padded_size_; first += part) {
+    for (std::size_t first = 0; first < padded_size_; first += n_at_once) {
       core::interruption_point();
       move_acrobots(dynamics_,
                     {{state_[0].data() + first, state_[1].data() + first, state_[2].data() + first,
@@ -186,7 +186,7 @@ class AcrobotBatch {
                      torque_.data() + first,
                      goal_tolerance_.data() + first,
                      mask_.data() + first},
-                    std::min(part, padded_size_ - first));
+                    std::min(n_at_once, padded_size_ - first));
     }
   }
 
@@ -194,6 +194,7 @@ class AcrobotBatch {
     return {state_[0][i], state_[1][i], state_[2][i], state_[3][i]};
   }
 
+  /// Writes four numbers for each acrobot, row_of(state).
   template <class RowOf>
   void write_rows(std::span<double> out, const RowOf& row_of) const {
     require_size("out", out.size(), 4);
@@ -202,6 +203,7 @@ class AcrobotBatch {
     }
   }
 
+  /// Begins an episode of acrobot i at a state.
   void begin_at(std::size_t i, const AcrobotState& state) {
     require_index(i);
     for (std::size_t k = 0; k < state_.size(); ++k) {
@@ -211,6 +213,8 @@ class AcrobotBatch {
     over_[i] = false;
   }
 
+  /// Checks the arguments of a step before any acrobot moves. Torques of resting acrobots may be
+  /// anything.
   void check_step(std::span<const double> torques, std::span<const double> goal_tolerances,
                   std::span<const std::uint8_t> moving, const AcrobotBatchResults& results) const {
     require_size("torques", torques.size());

@@ -140,7 +140,7 @@ inline std::string_view name_of(ClassScheme scheme) noexcept {
   return scheme == ClassScheme::one_vs_rest ? "one_vs_rest" : "one_vs_one";
 }
 
-/// Throws std::invalid_argument if there is no such scheme.
+/// Returns the scheme with this name. Throws std::invalid_argument if there is no such scheme.
 inline ClassScheme class_scheme_named(std::string_view name) {
   for (const auto scheme : kClassSchemes) {
     if (name == name_of(scheme)) return scheme;
@@ -161,8 +161,8 @@ inline std::size_t n_units_for(ClassScheme scheme, std::size_t n_classes) {
 /// Source: the LIBSDNN manual (both schemes). A one-vs-one unit ignores the other classes.
 class PerceptronRule {
  public:
-  /// Shapes: labels (n_samples,) in [0, n_classes). Throws std::invalid_argument otherwise, or if
-  /// n_units is not what the scheme needs.
+  /// Takes the class of each sample. Shapes: labels (n_samples,) in [0, n_classes). Throws
+  /// std::invalid_argument otherwise, or if n_units is not what the scheme needs.
   PerceptronRule(std::size_t n_units, std::span<const std::int32_t> labels, std::size_t n_classes,
                  ClassScheme scheme)
       : n_units_(n_units), labels_(labels.begin(), labels.end()) {

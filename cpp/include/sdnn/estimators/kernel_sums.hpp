@@ -74,6 +74,7 @@ SDNN_INLINE void stored(const Real& value, double* to) noexcept {
   value.store(to);
 }
 
+/// Computes the kernel of a query and groups of samples, several samples in each register.
 template <class Real>
 SDNN_INLINE void kernel_values_in_lanes(const SampleGroups& groups, std::size_t begin,
                                         std::size_t end, const KernelQuery& query,
@@ -81,8 +82,7 @@ SDNN_INLINE void kernel_values_in_lanes(const SampleGroups& groups, std::size_t 
   constexpr std::size_t kSize = sizeof(Real) / sizeof(double);
   constexpr std::size_t kRegisters = kGroupSamples / kSize;
   for (std::size_t group = begin; group < end; ++group) {
-    Real total[kRegisters];
-    Real squares[kRegisters];
+    Real total[kRegisters], squares[kRegisters];
     core::unrolled<kRegisters>([&](std::size_t r)
                                    SDNN_INLINE_LAMBDA { total[r] = squares[r] = Real(0.0); });
     const double* power = groups.powers + group * groups.n_geometric * 2 * kGroupSamples;
@@ -117,6 +117,7 @@ SDNN_INLINE void kernel_values_in_lanes(const SampleGroups& groups, std::size_t 
   }
 }
 
+/// The sum of products, as 16 partial sums on every machine, so that the bits are the same.
 template <class Real>
 SDNN_INLINE double product_in_lanes(const double* a, const double* b, std::size_t size) noexcept {
   constexpr std::size_t kSize = sizeof(Real) / sizeof(double);
@@ -208,16 +209,16 @@ class KernelSums {
     bins_.resize(core::checked_product(n_groups, tables_.size() * kGroupSamples));
     for (std::size_t s = 0; s < n_samples_; ++s) {
       const std::int32_t* const sample = &bins[s * n_inputs()];
-      const std::size_t group = s / kGroupSamples, place = s % kGroupSamples;
+      const std::size_t group = s / kGroupSamples, lane = s % kGroupSamples;
       for (std::size_t i = 0; i < geometric_.size(); ++i) {
         const double power = power_of(geometric_[i], sample);
         double* const at =
-            powers_.data() + (group * geometric_.size() + i) * 2 * kGroupSamples + place;
+            powers_.data() + (group * geometric_.size() + i) * 2 * kGroupSamples + lane;
         at[0] = power;
         at[kGroupSamples] = inverse(power);
       }
       for (std::size_t i = 0; i < tables_.size(); ++i) {
-        bins_[(group * tables_.size() + i) * kGroupSamples + place] = sample[tables_[i]];
+        bins_[(group * tables_.size() + i) * kGroupSamples + lane] = sample[tables_[i]];
       }
     }
   }
@@ -260,6 +261,7 @@ class KernelSums {
   static constexpr std::size_t kQueriesAtOnce = 16;   // they share the samples in the cache
   static constexpr std::size_t kPowersAtOnce = 3072;  // they fit into the first-level cache
 
+  /// Throws std::invalid_argument for correlations of a wrong size or value.
   static void check(const InputCorrelations& input) {
     const std::size_t n_bins = input.n_bins, size = input.values.size();
     core::require(n_bins > 0 && (size == n_bins || size / n_bins == n_bins), "inputs",

@@ -84,8 +84,9 @@ class KernelWindow {
     mean_sizes_.resize(size);
   }
 
-  /// Shapes: inputs (n_inputs,), outputs (n_outputs,). Throws std::invalid_argument for another
-  /// size. Thread safety: calls may run at the same time.
+  /// Predicts the outputs for a sample; 0 before the first one. Shapes: inputs (n_inputs,), outputs
+  /// (n_outputs,). Throws std::invalid_argument for another size. Thread safety: calls may run at
+  /// the same time.
   void predict(std::span<const double> inputs, std::span<double> outputs) const {
     core::require_size("inputs", inputs.size(), n_inputs());
     core::require_size("outputs", outputs.size(), n_outputs());

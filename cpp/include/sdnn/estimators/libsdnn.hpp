@@ -150,7 +150,8 @@ struct LibsdnnWeights {
   std::vector<std::int32_t> thresholds;  ///< (n_units,)
 };
 
-/// Throws std::invalid_argument unless low <= high and both are in [-10^6, 10^6].
+/// Draws weights and thresholds in LIBSDNN's order, uniformly in [low, high]. Throws
+/// std::invalid_argument unless low <= high and both are in [-10^6, 10^6].
 inline LibsdnnWeights libsdnn_weights(std::size_t n_units, std::size_t n_columns, int low, int high,
                                       LibsdnnRandom& random) {
   core::require_in_range("low", low, -1000000, 1000000);

@@ -92,8 +92,9 @@ class OnlineLayer {
     return count;
   }
 
-  /// Shapes: bins (n_queries, n_inputs), out (n_queries, n_units). Throws std::invalid_argument for
-  /// bins out of range. Thread safety: calls may run at the same time.
+  /// Computes the potentials of all units for each query. Shapes: bins (n_queries, n_inputs), out
+  /// (n_queries, n_units). Throws std::invalid_argument for bins out of range. Thread safety: calls
+  /// may run at the same time.
   void potentials(std::span<const std::int32_t> bins, std::span<std::int32_t> out) const {
     const ParallelPerceptron::Code& code = layer_->code();
     code.check_bins(bins);

@@ -170,6 +170,7 @@ class ParallelPerceptron {
         narrow.push_back(layer->narrow_.get([&] { return Narrow(code, layer->weights_); }));
       }
     }
+    // Either computes each query's potentials from those of the query before ...
     if (narrow.empty() || is_short_walk(code, bins, order)) {
       const auto sweep = [&](std::size_t begin, std::size_t end) {
         const auto queries = std::span(order).subspan(begin, end - begin);
@@ -188,6 +189,7 @@ class ParallelPerceptron {
       };
       return in_parts(order.size(), layers[0]->most_at_once(kSweptAtOnce), n_threads, sweep);
     }
+    // ... or adds the contributions of pairs of inputs, each along a short walk of its own.
     const auto answer = [&](const auto& tiles, std::size_t n_chunks) {
       const std::size_t n_padded = layers[0]->n_padded_units();
       const auto add = [&](std::size_t begin, std::size_t end) {
@@ -293,6 +295,7 @@ class ParallelPerceptron {
 
   /// The weights in 16 bits, which halves the memory to read, if the sums over chunks fit.
   struct Narrow {
+    /// Copies the weights if they fit; otherwise n_chunks is 0 and there are no tiles.
     Narrow(const Code& code, const WeightTiles<std::int32_t>& weights) {
       std::int64_t largest = 1;  // bound of the sum of a unit's |weights| in a chunk
       for (const PairChunk& chunk : pair_chunks(code)) {
@@ -352,13 +355,13 @@ class ParallelPerceptron {
                             std::span<const std::uint32_t> order) {
     const std::size_t n_words = code.n_words();
     std::vector<std::uint64_t> words(4 * n_words);
-    const auto code_at = [&](std::size_t place, std::uint64_t* to) {
-      code.encode(bins.subspan(order[place] * code.n_inputs(), code.n_inputs()), to, to + n_words);
+    const auto code_at = [&](std::size_t position, std::uint64_t* to) {
+      code.encode(bins.subspan(order[position] * code.n_inputs(), code.n_inputs()), to,
+                  to + n_words);
       return coding::TernaryCode{to, to + n_words};
     };
     coding::ColumnLists slots(n_words);
-    std::size_t n_changes = 0;
-    std::size_t n_steps = 0;
+    std::size_t n_changes = 0, n_steps = 0;
     const std::size_t step = order.size() / kFewQueries;
     for (std::size_t i = 1; i < order.size(); i += step, ++n_steps) {
       slots.read_changes(code_at(i - 1, words.data()), code_at(i, words.data() + 2 * n_words));

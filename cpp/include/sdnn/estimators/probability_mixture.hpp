@@ -93,6 +93,7 @@ class ProbabilityMixture {
     for (double& value : values) value /= sum;
   }
 
+  /// The weights of the candidates: the shares, and each scorer with each steepness.
   std::vector<double> candidate_weights() const {
     const double least = *std::ranges::min_element(losses_);
     std::vector<double> weights;

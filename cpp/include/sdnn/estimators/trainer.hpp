@@ -33,6 +33,7 @@ namespace sdnn::estimators {
 template <class Rule>
 class Trainer {
  public:
+  /// Takes the samples, whose targets or labels the rule has, and chooses the form of training.
   /// Shapes: bins (n_samples, n_inputs). Throws std::invalid_argument for bins out of range or if
   /// the rule is for another number of samples or units, std::length_error if `form` (other than
   /// automatic) needs more than `memory_limit` bytes.

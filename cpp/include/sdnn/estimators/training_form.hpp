@@ -35,7 +35,7 @@ inline std::string_view name_of(TrainingForm form) noexcept {
   return kNames[static_cast<std::size_t>(form)];
 }
 
-/// Throws std::invalid_argument if there is no such form.
+/// Returns the form with this name. Throws std::invalid_argument if there is no such form.
 inline TrainingForm training_form_named(std::string_view name) {
   for (const auto form : kTrainingForms) {
     if (name == name_of(form)) return form;
@@ -96,12 +96,16 @@ inline TrainingForm choose_form(TrainingForm form, std::size_t n_units,
     }
     return form;
   }
+  // Relative times of a presentation; their factors were fitted to measured times.
+  constexpr std::uint64_t kCacheBytes = std::uint64_t{32} << 20;
   const std::uint64_t padded_units = core::round_up(n_units, kTileStep);
-  const std::uint64_t row_factor = memory(TrainingForm::dual) > (std::size_t{32} << 20) ? 3 : 1;
+  const std::uint64_t row_factor = memory(TrainingForm::dual) > kCacheBytes ? 3 : 1;
   const std::uint64_t block_cost = code.n_slots() / 8 * (padded_units / 16) + code.n_slots();
-  const std::uint64_t before = std::uint64_t{n_samples} * code.n_words() * 2 / 7 + block_cost / 2;
-  const std::uint64_t dual_cost = row_factor * n_samples / 2 + n_units +
-                                  before / std::clamp<std::size_t>(n_epochs, 1, kExpectedEpochs);
+  const std::uint64_t set_up_cost =
+      std::uint64_t{n_samples} * code.n_words() * 2 / 7 + block_cost / 2;
+  const std::uint64_t dual_cost =
+      row_factor * n_samples / 2 + n_units +
+      set_up_cost / std::clamp<std::size_t>(n_epochs, 1, kExpectedEpochs);
   if (dual_cost <= block_cost && memory(TrainingForm::dual) <= memory_limit) {
     return TrainingForm::dual;
   }

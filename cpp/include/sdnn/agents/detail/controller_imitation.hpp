@@ -15,6 +15,7 @@
 
 namespace sdnn::agents {
 
+/// Throws std::invalid_argument for a transition that learn would refuse, and changes nothing.
 inline void Controller::check(std::span<const double> observation, std::span<const double> action,
                               double reward, std::span<const double> next_observation,
                               bool terminated, std::size_t environment, ActionMask next_mask,
@@ -92,16 +93,17 @@ inline void Controller::end_warm_up_of_teacher() {
   end_warm_up(kHeadroomOfTeacher);
 }
 
+/// Learns a teacher's action as the best one, in a state of this value; see the class.
 inline void Controller::imitate(std::span<const double> observation, std::span<const double> action,
                                 double value, double margin) {
   core::require_in_range("value", value, -kLargestReward, kLargestReward);
-  const auto held = readings_.filled(observation, 0, false, held_);
+  const auto filled = readings_.filled(observation, 0, false, held_);
   actions_.require_action(action);
   std::vector<std::size_t> indices;
   for (std::size_t d = 0; d < action.size(); ++d) {
     indices.push_back(actions_.index_of(action[d], d));
   }
-  last_states_.read(observations_, 0, held, state_, true);
+  last_states_.read(observations_, 0, filled, state_, true);
   std::visit(
       [&](auto& agent) {
         if constexpr (requires { agent.imitate(state_, indices, value, margin); }) {
@@ -119,11 +121,12 @@ inline void Controller::imitate(std::span<const double> observation, std::span<c
   readings_.note(held_, 0, false);
 }
 
+/// Notes a teacher's step for the history and for missing readings, but learns nothing.
 inline void Controller::follow_teacher(std::span<const double> observation,
                                        std::span<const double> action) {
-  const auto held = readings_.filled(observation, 0, false, held_);
+  const auto filled = readings_.filled(observation, 0, false, held_);
   actions_.require_action(action);
-  last_states_.read(observations_, 0, held, state_, true);
+  last_states_.read(observations_, 0, filled, state_, true);
   last_states_.keep(observations_, 0, true);
   last_states_.note_action(0, action, true);
   readings_.note(held_, 0, false);

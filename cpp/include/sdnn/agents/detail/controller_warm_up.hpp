@@ -165,6 +165,8 @@ inline void Controller::fit_to_warm_up(History history, double headroom) {
   fit(std::move(fitted), std::move(states));
 }
 
+/// Fits ranges, history and relevant inputs to the random experience, makes the agent, and lets it
+/// learn the transitions unless it learns on policy.
 inline void Controller::end_warm_up(double headroom) {
   const History history = config_.observation.history;
 #if SDNN_EXCEPTIONS
@@ -228,10 +230,10 @@ inline void Controller::replay(const WarmUp::Step& step, LastReadings& readings)
     begin_learned_episode(step.environment);
     readings.forget(step.environment);
   }
-  const auto held = readings.filled(step.observation, step.next_observation, step.environment);
+  const auto filled = readings.filled(step.observation, step.next_observation, step.environment);
   readings.note_step(step.environment);
-  last_states_.start(observations_, step.environment, held.observation, state_);
-  last_states_.follow(observations_, step.environment, step.action, held.next_observation,
+  last_states_.start(observations_, step.environment, filled.observation, state_);
+  last_states_.follow(observations_, step.environment, step.action, filled.next_observation,
                       next_state_, true);
   for (std::size_t d = 0; d < n_dimensions(); ++d) {
     indices_[d] = actions_.index_of(step.action[d], d);
@@ -240,6 +242,7 @@ inline void Controller::replay(const WarmUp::Step& step, LastReadings& readings)
                step.dt);
 }
 
+/// Prepares to restore a saved state: the warm-up or the agent is made while it is read.
 template <class Archive>
 void Controller::begin_reading(bool is_warming_up, const Archive& archive) {
   archive.expect(!is_warming_up || observations_.needs_fit(), "is_warming_up",
@@ -250,6 +253,7 @@ void Controller::begin_reading(bool is_warming_up, const Archive& archive) {
   if (is_warming_up) warm_up_.emplace(new_warm_up());
 }
 
+/// Checks that restored parts fit each other, such as remembered actions and the action space.
 template <class Archive>
 void Controller::end_reading(const Archive& archive) {
   archive.expect(taken_.fits(n_environments(), actions_), "taken.indices",

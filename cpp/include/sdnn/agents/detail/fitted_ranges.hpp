@@ -14,6 +14,8 @@
 
 namespace sdnn::agents {
 
+/// Fits unknown ranges and narrows those that are much too wide. `seen` has observations, then as
+/// many next ones.
 inline void Observations::fit(std::span<const double> seen, double headroom) {
   const auto pairs = config_.find_angle_pairs ? pairs_in(seen) : config_.angle_pairs;
   for (std::size_t i = 0; running_ && i < seen.size() / 2; i += n_variables()) {
@@ -47,6 +49,7 @@ inline void Observations::narrow(Ranges& ranges, std::size_t i, const std::vecto
   ranges.high[i] = std::min(high, ranges.high[i]);
 }
 
+/// The range with `headroom` times its width more at each end; for a constant, times its size.
 inline std::pair<double, double> Observations::widened(double low, double high,
                                                        double headroom) noexcept {
   low = std::clamp(low, -kLargest, kLargest);

@@ -137,6 +137,7 @@ class FuzzyDimension {
     if (terminated) end_traces(episode);
   }
 
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.part("rules", self.rules_);
@@ -148,8 +149,7 @@ class FuzzyDimension {
 
  private:
   struct Trace {
-    std::size_t rule;
-    std::size_t action;
+    std::size_t rule, action;
     double eligibility;
   };
 
@@ -191,6 +191,8 @@ class FuzzyDimension {
     return episode;
   }
 
+  /// Lists what is saved of an environment's episode; see core/state.hpp. Traces are saved as pairs
+  /// of rule and action, and their eligibilities.
   template <class Self, class Listed, class Archive>
   static void serialize_episode(Self& self, Listed& listed, Archive& archive) {
     archive.number("step", listed.step);
@@ -249,6 +251,7 @@ class FuzzyDimension {
     read = std::move(episode);
   }
 
+  /// Returns the configuration if it is valid; traces must decay, since their number is limited.
   static FuzzyQLearningConfig checked(const FuzzyQLearningConfig& config) {
     core::check_fields(config);
     core::require(config.discount * config.trace_decay <= kSlowestFading, "trace_decay",

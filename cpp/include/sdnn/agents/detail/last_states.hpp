@@ -218,6 +218,7 @@ class LastStates {
       begin(observations, observation, next, room);
     }
   }
+  /// Computes the state of an episode's first observation.
   void begin(const Observations& observations, std::span<const double> observation,
              LastState& first, Room& room) const {
     room.inputs.resize(history_.n_observed());
@@ -225,6 +226,7 @@ class LastStates {
     prepare(observation, first);
     history_.begin(room.inputs, first.memory, first.state, room.history);
   }
+  /// Computes the state of an observation that follows `action` in the state `before`.
   void continue_with(const Observations& observations, const LastState& before,
                      std::span<const double> action, std::span<const double> observation,
                      LastState& next, const char* name, Room& room) const {
@@ -241,6 +243,7 @@ class LastStates {
     next.state.resize(history_.n_inputs());
   }
 
+  /// Lists what is saved of a state; see core/state.hpp.
   void list(auto& last, auto& archive) const {
     archive.numbers("observation", last.observation);
     archive.numbers("state", last.state);

@@ -36,8 +36,7 @@ class LinearTD {
 
   /// The parts of a step: r + gamma Q' - Q and Q - Q_old, in units.
   struct Error {
-    std::int64_t error;
-    std::int64_t drift;
+    std::int64_t error, drift;
   };
 
   LinearTD(Readout readout, double discount, double trace_decay)

@@ -34,9 +34,10 @@ inline approximators::Thermometers thermometers_of(approximators::LinearSDNNConf
     const bool is_symbol = i < config.n_symbols.size() && config.n_symbols[i] > 0;
     if (is_symbol || (i < config.circular.size() && config.circular[i])) n_bins_of[i] = 0;
   }
+  // In its pairs half of an input's columns are active; the paired code has half as many.
   const std::int64_t n_active =
       std::int64_t{config.n_pattern_units} * coding::n_partners_of(config) / 4;
-  const auto n_words = static_cast<std::size_t>(std::max<std::int64_t>(1, n_active / 128));
+  const auto n_words = static_cast<std::size_t>(std::max<std::int64_t>(1, n_active / (2 * 64)));
   return {64 * n_words, std::move(n_bins_of)};
 }
 

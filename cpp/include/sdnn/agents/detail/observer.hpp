@@ -37,6 +37,7 @@ class Observer {
   static constexpr std::size_t kFewestTransitions = 100;
 
   Observer() = default;
+  /// Fits a linear model of changes, and the gain with which its predictions are corrected.
   /// Requires inputs and transitions within the limits above.
   explicit Observer(const RandomExperience& experience) : circular_(experience.circular) {
     find_scale(experience);
@@ -80,8 +81,8 @@ class Observer {
   void begin(std::span<const double> state, std::span<double> estimates) const noexcept {
     for (std::size_t i = 0; i < n_inputs(); ++i) estimates[i] = coordinate(state[i], i);
   }
-  /// Moves estimates to the next state, after an action. Shapes: (n_dimensions,), (n_inputs,);
-  /// `features` is room.
+  /// Moves estimates to the next state: predicts it from the action, and corrects the prediction by
+  /// the observed `state`. Shapes: (n_dimensions,), (n_inputs,); `features` is scratch memory.
   void follow(std::span<const double> action, std::span<const double> state,
               std::span<double> estimates, std::vector<double>& features) const {
     predict(action, estimates, features);
@@ -112,8 +113,8 @@ class Observer {
   /// products to fit.
   double share_of_last_changes(const RandomExperience& experience) const;
 
-  /// Lists the members that are saved and restored; see core/state.hpp. Inputs that are angles are
-  /// those of the task.
+  /// Lists the members that are saved and restored; see core/state.hpp. Which inputs are angles is
+  /// known from the task.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.numbers("means", self.means_);
@@ -230,6 +231,7 @@ class Observer {
     }
   }
 
+  /// The transitions in the observer's coordinates, up to kMostTransitions of them.
   Series coordinates_of(const RandomExperience& experience) const {
     const std::size_t n = std::min(experience.size(), kMostTransitions);
     Series series{n_inputs(), experience.actions.size()};
@@ -311,6 +313,8 @@ class Observer {
   /// replaced by what features of predictions explain of them.
   std::vector<double> instrumental_weights(const Series& series) const;
 
+  /// Fits the model of changes, by least squares, to the changes from the estimates to the next
+  /// observations.
   void fit_weights(const Series& series, const std::vector<double>& estimates) {
     std::vector<double> features, changes, row;
     for (std::size_t t = 0; t < series.size(); ++t) {
@@ -341,6 +345,7 @@ class Observer {
       correct(estimates, errors);
     }
   }
+  /// The observer's estimates of all states of a series, row by row.
   std::vector<double> estimates_of(const Series& series) const {
     std::vector<double> rows;
     run(

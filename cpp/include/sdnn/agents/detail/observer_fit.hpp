@@ -14,6 +14,8 @@
 
 namespace sdnn::agents::detail {
 
+/// Searches for better gains and model weights in turns, and keeps those that predict best. The
+/// noise of sensors is half of the error of a model that trusts them.
 inline void Observer::refine(const RandomExperience& experience) {
   const Series series = coordinates_of(experience);
   Observer next = *this;
@@ -33,6 +35,8 @@ inline void Observer::refine(const RandomExperience& experience) {
   find_range(estimates_of(series));
 }
 
+/// The share of the changes of inputs that only the last changes explain: evidence of hidden
+/// velocities. Each half of the transitions predicts the other one.
 inline double Observer::share_of_last_changes(const RandomExperience& experience) const {
   const Series series = coordinates_of(experience);
   std::vector<double> with, without, linear, changes, features;
@@ -67,6 +71,7 @@ inline double Observer::share_of_last_changes(const RandomExperience& experience
   return std::ranges::max(shares);
 }
 
+/// The linear model's matrix, from a state to the next one; for angles, linearized at their mean.
 inline std::vector<double> Observer::transition(const Series& series) const {
   const std::size_t n = n_inputs();
   std::vector<double> matrix(n * n);
@@ -90,6 +95,8 @@ inline std::vector<double> Observer::transition(const Series& series) const {
   return matrix;
 }
 
+/// Fits the model by two-stage least squares, with the predicted states as instruments: noise in
+/// the observations would bias a plain fit.
 inline std::vector<double> Observer::instrumental_weights(const Series& series) const {
   const std::size_t n = n_inputs();
   std::vector<double> surprises, predicted(n), instruments, features, changes, row;
@@ -121,6 +128,8 @@ inline std::vector<double> Observer::instrumental_weights(const Series& series) 
   return least_squares(features, changes, size);
 }
 
+/// The share of each input's squared changes in one half of the data that a fit to the other half
+/// explains.
 inline std::vector<double> Observer::explained(const std::vector<double>& features,
                                                const std::vector<double>& changes,
                                                bool is_first) const {

@@ -19,7 +19,7 @@ namespace sdnn::agents::detail {
 struct QLambdaEpisode {
   approximators::LinearSDNN::Trace trace;
   approximators::LinearSDNN::Workspace present;  ///< workspace of `state`
-  approximators::LinearSDNN::Workspace next;     ///< workspace of the next state, or of another
+  approximators::LinearSDNN::Workspace next;     ///< of the next state, or of a greedy step's state
   bool waits = false;  ///< the episode continues; with Sarsa, its last transition is pending
   // The last transition, which Sarsa learns once the next action is known.
   std::vector<double> state;
@@ -77,14 +77,14 @@ std::int64_t best_sum(const Readout& readout, typename Readout::Workspace& read,
   std::int64_t total = 0;
   for (std::size_t d = 0; d < readout.n_dimensions(); ++d) {
     const auto sums = readout.sums(read, d);
-    const ActionMask part = take_part(mask, sums.size());
-    if (part.empty()) {
+    const ActionMask dimension_mask = take_part(mask, sums.size());
+    if (dimension_mask.empty()) {
       total += std::ranges::max(sums);
       continue;
     }
     std::int64_t best = std::numeric_limits<std::int64_t>::min();
     for (std::size_t a = 0; a < sums.size(); ++a) {
-      if (part[a] != 0) best = std::max(best, sums[a]);
+      if (dimension_mask[a] != 0) best = std::max(best, sums[a]);
     }
     total += best;
   }

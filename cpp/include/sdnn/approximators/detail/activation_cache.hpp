@@ -102,6 +102,7 @@ namespace detail {
 inline constexpr std::size_t kCacheEntries = 64;
 using Distances = std::array<std::int32_t, kCacheEntries>;
 
+/// Sums |cached bin - bin| over the inputs, for as many cached states at once as `distances` has.
 SDNN_INLINE void add_up_distances_body(const coding::Bin* cached, std::span<const coding::Bin> bins,
                                        Distances& distances) noexcept {
   Distances sums{};
@@ -200,8 +201,7 @@ class ActivationCache {
     }
     detail::Distances distances;
     add_up_distances(bins_by_input_.data(), bins, distances);
-    std::size_t nearest = kEntries;
-    std::size_t oldest = 0;
+    std::size_t nearest = kEntries, oldest = 0;
     std::uint64_t oldest_use = last_use_[oldest];
     double least = columns_of_pass_;
     for (std::size_t slot = 0; slot < kEntries; ++slot) {

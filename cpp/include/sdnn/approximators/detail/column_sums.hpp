@@ -98,6 +98,8 @@ Bytes group_sum_portable(const std::int8_t* block, const std::uint32_t* places) 
   return sum;
 }
 
+/// Adds `factor` times the sum of the columns to `sums`. Groups of columns are summed in bytes,
+/// groups of a part in 16 bits.
 template <std::size_t Group>
 void add_groups_portable(const std::int8_t* block, const ColumnPlaces& places, int factor,
                          std::int32_t* sums) {
@@ -115,6 +117,7 @@ void add_groups_portable(const std::int8_t* block, const ColumnPlaces& places, i
   }
 }
 
+/// The function add_columns below without vector instructions.
 inline void add_columns_portable(const std::int8_t* block, const ColumnPlaces& places, int group,
                                  int factor, std::int32_t* sums) {
   switch (group) {
@@ -197,6 +200,7 @@ inline void add_columns_neon(const std::int8_t* block, const ColumnPlaces& place
 // them pair by pair. Interleaving changes the order of the 16-bit sums, which is restored at the
 // end.
 
+/// The sum of a group's columns in bytes, for one half of the block's units.
 [[SDNN_TARGET_AVX2, gnu::always_inline]] inline __m256i group_sum_avx2(const std::int8_t* block,
                                                                        const std::uint32_t* places,
                                                                        std::size_t group,
@@ -209,6 +213,8 @@ inline void add_columns_neon(const std::int8_t* block, const ColumnPlaces& place
   return sum;
 }
 
+/// Works like add_groups_portable: pairs of group sums are interleaved and added to 16 bits at
+/// once.
 template <std::size_t Group>
 [[SDNN_TARGET_AVX2]] void add_groups_avx2(const std::int8_t* block, const ColumnPlaces& places,
                                           int factor, std::int32_t* sums) {
@@ -246,6 +252,7 @@ template <std::size_t Group>
   }
 }
 
+/// The function add_columns below for AVX2.
 [[SDNN_TARGET_AVX2]] inline void add_columns_avx2(const std::int8_t* block,
                                                   const ColumnPlaces& places, int group, int factor,
                                                   std::int32_t* sums) {
@@ -266,6 +273,7 @@ template <std::size_t Group>
 #pragma GCC diagnostic ignored "-Wuninitialized"
 #endif
 
+/// The sum of a group's columns in bytes, for all units of the block.
 [[SDNN_TARGET_AVX512, gnu::always_inline]] inline __m512i group_sum_avx512(
     const std::int8_t* block, const std::uint32_t* places, std::size_t group) {
   __m512i sum = _mm512_load_si512(column_at(block, places[0]));
@@ -275,6 +283,8 @@ template <std::size_t Group>
   return sum;
 }
 
+/// Works like add_groups_portable: pairs of group sums are interleaved and added to 16 bits at
+/// once.
 template <std::size_t Group>
 [[SDNN_TARGET_AVX512]] void add_groups_avx512(const std::int8_t* block, const ColumnPlaces& places,
                                               int factor, std::int32_t* sums) {
@@ -309,6 +319,7 @@ template <std::size_t Group>
   }
 }
 
+/// The function add_columns below for AVX-512.
 [[SDNN_TARGET_AVX512]] inline void add_columns_avx512(const std::int8_t* block,
                                                       const ColumnPlaces& places, int group,
                                                       int factor, std::int32_t* sums) {
@@ -344,6 +355,7 @@ namespace detail {
 using ByteRegister = core::IntegerRegister<std::int8_t>;
 inline constexpr std::size_t kRegistersOfColumn = kBlockUnits / ByteRegister::kSize;
 
+/// Adds `change`, a byte for each unit, to each of the listed columns.
 SDNN_INLINE void add_to_columns_body(std::int8_t* block, const std::uint32_t* columns,
                                      std::size_t n_columns, const Bytes& change) noexcept {
   for (std::size_t k = 0; k < n_columns; ++k) {
@@ -357,6 +369,7 @@ SDNN_INLINE void add_to_columns_body(std::int8_t* block, const std::uint32_t* co
   }
 }
 
+/// Writes the largest |byte| of each unit in all columns.
 SDNN_INLINE void find_largest_bytes_body(const std::int8_t* block, std::size_t n_columns,
                                          Bytes& largest) noexcept {
   ByteRegister sizes[kRegistersOfColumn];

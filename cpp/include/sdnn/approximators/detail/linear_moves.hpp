@@ -14,6 +14,8 @@
 
 namespace sdnn::approximators {
 
+/// Doubles the unit of weights until all are below kLargestWeight; `used` has all bits that any
+/// weight uses.
 inline void LinearSDNN::shrink_weights(std::int32_t used) noexcept {
   while (used >= kLargestWeight) {
     double_unit();
@@ -23,6 +25,7 @@ inline void LinearSDNN::shrink_weights(std::int32_t used) noexcept {
   }
 }
 
+/// Moves the value of every row by rate * error, in equal steps of the weights that the code uses.
 inline int LinearSDNN::move_rows(const Code& code, std::span<const std::int64_t> errors,
                                  std::int32_t rate) {
   assert(errors.size() == n_rows());

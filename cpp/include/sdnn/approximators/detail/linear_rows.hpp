@@ -65,6 +65,8 @@ constexpr std::int32_t multiplied(std::int32_t weight, int n) noexcept {
 
 namespace detail {
 
+/// Writes the sums of weights times signs of kRows rows, so that each sign is read once for all of
+/// them.
 template <std::size_t kRows>
 SDNN_INLINE void sum_rows_at_once(const std::int32_t* const* rows, const std::int8_t* signs,
                                   std::size_t n_columns, std::int64_t* sums) noexcept {
@@ -81,6 +83,7 @@ SDNN_INLINE void sum_rows_at_once(const std::int32_t* const* rows, const std::in
   }
 }
 
+/// Writes the sums of weights times signs of all rows, four, two or one at a time.
 SDNN_INLINE void row_sums_body(const std::int32_t* const* rows, std::size_t n_rows,
                                const std::int8_t* signs, std::size_t n_columns,
                                std::int64_t* sums) noexcept {
@@ -115,6 +118,8 @@ SDNN_INLINE RowUse learn_columns(std::int32_t* weights, std::int32_t* traces,
   return {traces_used, weights_used};
 }
 
+/// Decays and raises a row's traces, and moves its weights. Without a correction, which is the
+/// usual case, the loop is faster.
 SDNN_INLINE RowUse learn_row_body(std::int32_t* weights, std::int32_t* traces,
                                   const std::int8_t* signs, std::size_t n_columns,
                                   RowStep step) noexcept {
@@ -122,6 +127,7 @@ SDNN_INLINE RowUse learn_row_body(std::int32_t* weights, std::int32_t* traces,
                               : learn_columns<true>(weights, traces, signs, n_columns, step);
 }
 
+/// Writes the code's entries, +1, 0 or -1, from its words of bits.
 SDNN_INLINE void spread_signs_body(const std::uint64_t* active, const std::uint64_t* positive,
                                    std::size_t n_words, std::int8_t* signs) noexcept {
   for (std::size_t w = 0; w < n_words; ++w) {
@@ -204,6 +210,7 @@ class LinearTrace {
   std::int32_t* row(std::size_t i) noexcept { return &values_[i * n_columns_]; }
   void set_live(std::size_t i, bool is_live) noexcept { live_[i] = is_live; }
 
+  /// Sets all traces to 0. Rows that are not live have none.
   void clear() noexcept {
     for (std::size_t row = 0; row < live_.size(); ++row) {
       if (live_[row]) std::fill_n(&values_[row * n_columns_], n_columns_, 0);
@@ -211,6 +218,7 @@ class LinearTrace {
     }
   }
 
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     std::vector<std::int32_t> values;  // empty without a trace

@@ -97,7 +97,7 @@ std::vector<std::size_t> strides_of(const Config& config, std::uint64_t seed) {
   order.resize(static_cast<std::size_t>(coding::n_partners_of(config)));
   std::ranges::sort(order);
   std::vector<std::size_t> strides;
-  for (const auto place : order) strides.push_back(std::size_t{place} + 1);
+  for (const auto index : order) strides.push_back(std::size_t{index} + 1);  // from 1 on
   return strides;
 }
 

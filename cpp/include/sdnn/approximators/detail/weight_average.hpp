@@ -70,6 +70,7 @@ class WeightAverage {
   }
   std::int64_t threshold(std::size_t unit) const noexcept { return thresholds_[unit]; }
 
+  /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     std::vector<std::int16_t> weights(self.n_units_ * self.n_columns_);
@@ -189,6 +190,8 @@ inline std::int32_t averaged_threshold(const WeightAverage& average, std::size_t
   return static_cast<std::int32_t>(
       detail::rounded_average(average.threshold(unit), WeightAverage::kFractionBits));
 }
+/// The averaged weight of a column of the unpaired code, from the one or two paired columns that it
+/// was stored in; rounded and clipped.
 inline std::int32_t averaged_weight(const WeightAverage& average, std::size_t unit,
                                     const PairedColumns& columns, std::int64_t limit) noexcept {
   std::int64_t weight = average.weight(unit, columns.first);
@@ -200,6 +203,7 @@ inline std::int32_t averaged_weight(const WeightAverage& average, std::size_t un
 
 /// A constant layer of averaged weights, and its log for caches.
 struct AveragedLayer {
+  /// Makes a layer of the averaged weights and thresholds, rounded to integers.
   AveragedLayer(const WeightAverage& average, const coding::StateCode& code, std::size_t n_units,
                 std::int64_t limit)
       : layer(paired_layer(

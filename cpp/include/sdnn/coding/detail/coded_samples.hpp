@@ -20,7 +20,7 @@ namespace sdnn::coding {
 /// vector register.
 class CodedSamples {
  public:
-  /// Shapes: bins (n_samples, n_inputs), checked before.
+  /// Encodes samples. Shapes: bins (n_samples, n_inputs), checked before.
   CodedSamples(const SelectiveDesensitization& code, std::span<const Bin> bins)
       : n_words_(padded_words(code)),
         size_(bins.size() / code.n_inputs()),

@@ -159,6 +159,7 @@ namespace detail {
 
 /// The bits of a word where the code's entry goes up or down, and those where it does so by 2.
 struct WordChanges {
+  /// Finds the columns of a word that rise or fall by 1, and those that do so by 2.
   SDNN_INLINE WordChanges(const TernaryCode& from, const TernaryCode& to,
                           std::size_t word) noexcept {
     const std::uint64_t plus = to.positive[word];
@@ -219,6 +220,7 @@ inline std::uint32_t* append_many_bits(std::uint32_t* to, std::uint64_t bits,
   return to;
 }
 
+/// The function list_columns below without vector instructions.
 inline void list_columns_portable(const TernaryCode& code,
                                   std::span<const std::uint32_t> first_columns,
                                   std::uint32_t** plus, std::uint32_t** minus) noexcept {
@@ -269,6 +271,7 @@ inline void list_columns_avx2(const TernaryCode& code, std::span<const std::uint
 
 #endif  // SDNN_X86_KERNELS
 
+/// Lists the words that differ, without a branch for each, and then the columns in these words.
 SDNN_INLINE void list_changes_body(const TernaryCode& from, const TernaryCode& to,
                                    std::span<const std::uint32_t> first_columns,
                                    std::uint32_t* words, std::uint32_t** up,

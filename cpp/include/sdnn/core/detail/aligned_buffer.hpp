@@ -40,6 +40,7 @@ class AlignedBuffer {
 
  public:
   AlignedBuffer() = default;
+  /// Allocates zeros. Throws std::bad_alloc if there is not enough memory.
   explicit AlignedBuffer(std::size_t size) : size_(size) {
     if (size == 0) return;
     constexpr std::size_t kMost = std::numeric_limits<std::size_t>::max() - kCacheLine;

@@ -30,10 +30,10 @@ class Threads {
     for (std::thread& thread : threads_) thread.join();
   }
 
-  /// Calls work(part) in a thread.
-  template <class Work, class Part>
-  void start(const Work& work, Part part) {
-    threads_.emplace_back(work, part);
+  /// Calls work(number) in a new thread.
+  template <class Work, class Number>
+  void start(const Work& work, Number number) {
+    threads_.emplace_back(work, number);
   }
 
  private:
@@ -47,9 +47,9 @@ struct Mutex {};
 /// A substitute for a future: the caller does the work immediately.
 class Threads {
  public:
-  template <class Work, class Part>
-  void start(const Work& work, Part part) {
-    work(part);
+  template <class Work, class Number>
+  void start(const Work& work, Number number) {
+    work(number);
   }
 };
 

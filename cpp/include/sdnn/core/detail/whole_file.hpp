@@ -38,6 +38,7 @@ namespace sdnn::core {
 /// the system's error. On POSIX systems content and name are on the disk when `finish` returns.
 class WholeFile {
  public:
+  /// Opens a new temporary file beside `path`, or a device or pipe itself.
   explicit WholeFile(const std::filesystem::path& path)
       : path_(path), partial_(path), is_special_(is_special(path)) {
     if (!is_special_) partial_ += partial_suffix();
@@ -78,6 +79,7 @@ class WholeFile {
 #endif
   }
 
+  /// Completes the file: its data reach the disk before it takes the place of an older one.
   void finish() {
 #if SDNN_HAS_POSIX_FILES
     if (!is_special_ && ::fsync(file_) != 0) fail("cannot be written");
@@ -104,7 +106,7 @@ class WholeFile {
     return folder == "/dev" || folder == "/dev/fd" || folder == "/proc/self/fd";
   }
 
-  /// Returns an unpredictable suffix.
+  /// Returns a suffix that nobody can predict, so that no two writers have the same temporary file.
   static std::string partial_suffix() {
     std::random_device random;
     std::string suffix = ".";
@@ -112,6 +114,7 @@ class WholeFile {
     return suffix += ".partial";
   }
 
+  /// Gives the temporary file its final name, which replaces an older file at once.
   void rename() {
     std::error_code error;
     std::filesystem::rename(partial_, path_, error);
@@ -127,6 +130,7 @@ class WholeFile {
                                   std::generic_category().message(errno)));
   }
 
+  /// Closes the file; returns whether all data could be written.
   bool close() noexcept {
 #if SDNN_HAS_POSIX_FILES
     const int descriptor = file_;
@@ -153,6 +157,8 @@ class WholeFile {
 /// the writer of a pipe. Throws std::runtime_error that names the problem, but not the file.
 class RegularFile {
  public:
+  /// Opens a file to read. Throws std::runtime_error unless it is a regular one, for which no read
+  /// waits.
   explicit RegularFile(const std::filesystem::path& path) {
 #if SDNN_HAS_POSIX_FILES
     file_ = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);

@@ -16,6 +16,7 @@ namespace sdnn::core {
 /// must not be used from several threads at once.
 class WorkerTeam {
  public:
+  /// Starts the threads, except for the caller's, which works as number 0.
   explicit WorkerTeam(std::size_t n_threads) {
 #if SDNN_HAS_THREADS
     struct EndsWaiting {  // ends the waiting threads if no further thread can be started
@@ -25,8 +26,8 @@ class WorkerTeam {
         if (!has_all) team.start();
       }
     } waiting{*this};
-    for (std::size_t part = 1; part < n_threads; ++part) {
-      threads_.start([this](std::size_t own_part) { serve(own_part); }, part);
+    for (std::size_t thread = 1; thread < n_threads; ++thread) {
+      threads_.start([this](std::size_t number) { serve(number); }, thread);
       ++n_others_;
     }
     waiting.has_all = true;
@@ -43,13 +44,13 @@ class WorkerTeam {
 
   std::size_t size() const noexcept { return n_others_ + 1; }
 
-  /// Calls work(part) for part = 0 .. size() - 1, each in a different thread, and waits for all.
-  /// `work` must not throw.
+  /// Calls work(thread) for thread = 0 .. size() - 1, each in a different thread, and waits for
+  /// all. `work` must not throw.
   template <class Work>
   void run(const Work& work) {
     if (n_others_ == 0) return work(std::size_t{0});
     work_ = &work;
-    call_ = [](const void* what, std::size_t part) { (*static_cast<const Work*>(what))(part); };
+    call_ = [](const void* what, std::size_t thread) { (*static_cast<const Work*>(what))(thread); };
     n_busy_.store(n_others_, std::memory_order_relaxed);
     start();
     work(std::size_t{0});
@@ -59,11 +60,11 @@ class WorkerTeam {
   /// Calls work(i) for i = 0 .. n - 1, divided into a contiguous part for each thread.
   template <class Work>
   void run_over(std::size_t n, const Work& work) {
-    run([&](std::size_t part) {
+    run([&](std::size_t thread) {
       const auto begin_of = [&](std::uint64_t k) {
         return static_cast<std::size_t>(k * n / size());
       };
-      for (std::size_t i = begin_of(part); i < begin_of(part + 1); ++i) work(i);
+      for (std::size_t i = begin_of(thread); i < begin_of(thread + 1); ++i) work(i);
     });
   }
 
@@ -73,12 +74,13 @@ class WorkerTeam {
     round_.notify_all();
   }
 
-  void serve(std::size_t part) {
+  /// Waits for each round of work and does its own part, until there is no work.
+  void serve(std::size_t thread) {
     for (std::uint64_t seen = 0;;) {
       round_.wait(seen, std::memory_order_acquire);
       ++seen;
       if (work_ == nullptr) return;
-      call_(work_, part);
+      call_(work_, thread);
       if (n_busy_.fetch_sub(1) == 1) n_busy_.notify_one();
     }
   }

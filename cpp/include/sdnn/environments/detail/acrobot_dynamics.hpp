@@ -52,6 +52,7 @@ template <class Real>
 struct AcrobotAngles {
   Real sin_1, cos_1, sin_2, cos_2, sin_12, cos_12;
 
+  /// Sines and cosines of both angles and, by the addition theorems, of their sum.
   SDNN_INLINE static AcrobotAngles of(const core::BasicSinCos<Real>& joint_1,
                                       const core::BasicSinCos<Real>& joint_2) noexcept {
     return {joint_1.sin,
@@ -248,6 +249,8 @@ class AcrobotDynamics {
   double gravity_2_ = 0.0;   // m2 lc2 g
 };
 
+/// Throws std::invalid_argument for fields out of range, or integration steps that do not divide a
+/// decision.
 inline void AcrobotDynamics::check(const AcrobotConfig& config) {
   core::check_fields(config);
   const double ratio = config.decision_interval / config.integration_step;

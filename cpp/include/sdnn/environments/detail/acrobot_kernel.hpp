@@ -26,7 +26,8 @@ inline constexpr std::size_t kAcrobotLanes = 8;
 namespace detail {
 
 #if SDNN_LANES
-/// The kernel for registers of `Size` doubles, to be inlined where the instruction set is known.
+/// Moves acrobots until the next decision, Size of them at once in registers of doubles; to be
+/// inlined where the instruction set is known.
 template <std::size_t Size>
 SDNN_INLINE void move_in_lanes(const AcrobotDynamics& dynamics, const AcrobotArrays& arrays,
                                std::size_t n) noexcept {

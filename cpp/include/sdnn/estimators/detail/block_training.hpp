@@ -196,8 +196,8 @@ class BlockTraining {
   void make_plan(std::span<const std::int32_t> samples, Plan* plan) {
     plan->stride = core::round_up(samples.size(), PresentationWindow::kAtOnce);
     plan->products = core::AlignedBuffer<Product>(samples.size() * plan->stride);
-    team_.run([&](std::size_t part) {
-      for (std::size_t b = part; b < samples.size(); b += team_.size()) {
+    team_.run([&](std::size_t thread) {
+      for (std::size_t b = thread; b < samples.size(); b += team_.size()) {
         for (std::size_t e = b; e < samples.size(); ++e) {  // products with later samples
           plan->products[b * plan->stride + e] =
               static_cast<Product>(1 + coding::inner_product(code_of(b), code_of(e), n_words_));
@@ -240,16 +240,16 @@ class BlockTraining {
             : kMostChunks;
     std::vector<ChunkSums<Weight>> sums(team_.size(),
                                         ChunkSums<Weight>(n_samples, n_chunks_in_sum));
-    team_.run([&](std::size_t part) {
-      for (std::size_t first = part * width; first < n_padded; first += team_.size() * width) {
+    team_.run([&](std::size_t thread) {
+      for (std::size_t first = thread * width; first < n_padded; first += team_.size() * width) {
         const std::size_t n = std::min(width, n_padded - first);
         const auto read_rows = [&](std::size_t k, Weight* rows) {
           const PairChunk& chunk = chunks_[k];
-          transpose(
-              weights.chunk(chunk.place / kChunkWords, first) + chunk.place % kChunkWords * 64,
-              kChunkColumns, n, 64 * chunk.words.size(), rows, n);
+          transpose(weights.chunk(chunk.position / kChunkWords, first) +
+                        chunk.position % kChunkWords * 64,
+                    kChunkColumns, n, 64 * chunk.words.size(), rows, n);
         };
-        sums[part].add(walks, n, read_rows, potentials_.data() + first, n_padded);
+        sums[thread].add(walks, n, read_rows, potentials_.data() + first, n_padded);
       }
     });
   }

@@ -79,17 +79,17 @@ class ChunkedWeights {
   }
 
  private:
-  /// Calls visit(unit, slot, where its weight is).
+  /// Calls visit(unit, slot, index of its weight in weights_) for all units and slots of the tiles.
   template <class Visit>
   void for_each_slot(const WeightTiles<std::int32_t>& tiles, const Words& words,
                      const Visit& visit) const {
     for (std::size_t unit = 0; unit < tiles.n_units(); ++unit) {
-      for (std::size_t place = 0; place < words.size(); ++place) {
-        if (64 * words[place] >= tiles.n_slots()) continue;
-        const std::size_t chunk = place / kChunkWords;
+      for (std::size_t position = 0; position < words.size(); ++position) {
+        if (64 * words[position] >= tiles.n_slots()) continue;
+        const std::size_t chunk = position / kChunkWords;
         const std::size_t at =
-            (chunk * n_padded_units_ + unit) * kChunkColumns + place % kChunkWords * 64;
-        for (std::size_t k = 0; k < 64; ++k) visit(unit, 64 * words[place] + k, at + k);
+            (chunk * n_padded_units_ + unit) * kChunkColumns + position % kChunkWords * 64;
+        for (std::size_t k = 0; k < 64; ++k) visit(unit, 64 * words[position] + k, at + k);
       }
     }
   }
@@ -119,15 +119,14 @@ struct CodeWalk {
   /// The change from the previous code, or from the code of zeros: columns that rise, then columns
   /// that fall.
   struct Step {
-    std::uint16_t n_rising;
-    std::uint16_t n_falling;
+    std::uint16_t n_rising, n_falling;
     bool from_zero;
   };
   std::vector<std::uint8_t> columns;  ///< columns of all steps
   std::vector<Step> steps;
-  std::vector<std::uint16_t> places;  ///< the step that leads to the code of each sample
+  std::vector<std::uint16_t> step_of_sample;  ///< the step that leads to the code of each sample
 
-  /// The largest number of samples that a place can index.
+  /// The largest number of samples, which have at most as many steps, numbered in 16 bits.
   static constexpr std::size_t kMostSamples = std::size_t{1} << 16;
   /// The largest number of bytes of the walks of all chunks of n_samples codes.
   static std::uint64_t bytes(std::uint64_t n_samples, std::uint64_t n_chunks,
@@ -138,14 +137,15 @@ struct CodeWalk {
 
 namespace detail {
 
+/// Lists the columns that change from code to code; see list_steps below. Each code starts from the
+/// previous one or from zero, whichever differs in fewer columns.
 SDNN_INLINE std::uint8_t* list_steps_body(std::span<const ChunkCode> codes, std::size_t n_words,
                                           std::uint8_t* at, CodeWalk::Step* steps) noexcept {
   ChunkCode last{};
   for (const ChunkCode& code : codes) {
     const coding::TernaryCode from{last.active, last.positive};
     const coding::TernaryCode to{code.active, code.positive};
-    int n_changes = 0;
-    int n_active = 0;
+    int n_changes = 0, n_active = 0;
     for (std::size_t w = 0; w < n_words; ++w) {
       const coding::detail::WordChanges changes(from, to, w);
       n_changes += std::popcount(changes.up) + std::popcount(changes.up_again) +
@@ -172,6 +172,7 @@ SDNN_INLINE std::uint8_t* list_steps_body(std::span<const ChunkCode> codes, std:
   return at;
 }
 
+/// Sums rows of weights along a walk, by its changes; see sum_steps below.
 template <class Weight>
 SDNN_INLINE void sum_steps_body(const Weight* rows, std::size_t width, const CodeWalk& walk,
                                 Weight* sums) noexcept {
@@ -209,11 +210,12 @@ SDNN_INLINE void sum_steps_body(const Weight* rows, std::size_t width, const Cod
 template <class Weight>
 struct StepSums {
   const Weight* sums;
-  const std::uint16_t* places;
+  const std::uint16_t* step_of_sample;
 };
 
 namespace detail {
 
+/// Adds the sums of all walks to each sample's potentials; see add_step_sums below.
 template <class Weight>
 SDNN_INLINE void add_step_sums_body(std::span<const StepSums<Weight>> walks, std::size_t width,
                                     std::size_t n_samples, std::int32_t* potentials,
@@ -225,7 +227,7 @@ SDNN_INLINE void add_step_sums_body(std::span<const StepSums<Weight>> walks, std
       Lane sum[kRegisters];
       core::unrolled<kRegisters>([&](std::size_t r) SDNN_INLINE_LAMBDA { sum[r].clear(); });
       for (const StepSums<Weight>& walk : walks) {
-        const Weight* const row = walk.sums + std::size_t{walk.places[s]} * Width;
+        const Weight* const row = walk.sums + std::size_t{walk.step_of_sample[s]} * Width;
         core::unrolled<kRegisters>([&](std::size_t r)
                                        SDNN_INLINE_LAMBDA { sum[r].add(row + r * Lane::kSize); });
       }

@@ -52,8 +52,8 @@ class DualTraining {
         gathered_(kWindow * kWindow) {
     for (std::size_t first = 0; first < coded_.size(); first += kRows * team_.size()) {
       core::interruption_point();
-      team_.run([&](std::size_t part) {
-        const std::size_t begin = std::min(first + kRows * part, coded_.size());
+      team_.run([&](std::size_t thread) {
+        const std::size_t begin = std::min(first + kRows * thread, coded_.size());
         fill_products(begin, std::min(begin + kRows, coded_.size()));
       });
     }
@@ -143,7 +143,8 @@ class DualTraining {
     }
   }
 
-  /// Adds word w of the samples to 64 rows of a tile, in 16 bits while the sum fits.
+  /// Adds coefficient * x_SD of the samples to the 64 rows of a tile that belong to word w of
+  /// codes. Sums are kept in 16 bits while they fit.
   void add_samples(std::int32_t* rows, std::size_t width, std::size_t tile, std::size_t w,
                    const std::vector<std::pair<std::size_t, std::int32_t>>& samples) const {
     alignas(core::kCacheLine) std::array<std::int16_t, 64 * kTileUnits> sums{};
@@ -207,6 +208,7 @@ class DualTraining {
     return present_window(samples, gathered_.data(), kWindow, rule);
   }
 
+  /// Presents the samples of the window, and records each correction to be applied later.
   template <class Rule>
   TrainingCount present_window(std::span<const std::int32_t> samples, const Product* products,
                                std::size_t stride, Rule& rule) {

@@ -32,7 +32,7 @@ struct PairChunk {
   std::size_t input;
   std::size_t other_input;
   std::vector<std::size_t> words;
-  std::size_t place = 0;  ///< position of its first word among those of all chunks
+  std::size_t position = 0;  ///< position of its first word among those of all chunks
 };
 
 /// Divides all words of a code into chunks, large chunks first. The pairs (a, b) and (b, a)
@@ -46,12 +46,12 @@ inline std::vector<PairChunk> pair_chunks(const coding::SelectiveDesensitization
     }
   }
   std::vector<PairChunk> chunks;
-  std::size_t place = 0;
+  std::size_t position = 0;
   for (const std::size_t size : {kChunkWords, std::size_t{2}, std::size_t{1}}) {
     for (auto& [inputs, left] : words) {
-      for (; left.size() >= size; left.resize(left.size() - size), place += size) {
+      for (; left.size() >= size; left.resize(left.size() - size), position += size) {
         const auto last = std::span(left).last(size);
-        chunks.push_back({inputs.first, inputs.second, {last.begin(), last.end()}, place});
+        chunks.push_back({inputs.first, inputs.second, {last.begin(), last.end()}, position});
       }
     }
   }
@@ -62,7 +62,8 @@ inline std::vector<PairChunk> pair_chunks(const coding::SelectiveDesensitization
 /// strips of the same bin of one input, alternately up and down the bins of the other.
 class PairWalks {
  public:
-  /// Shapes: bins (n_samples, n_inputs), at most CodeWalk::kMostSamples.
+  /// Sorts the samples by the bins of each input, from which any pair is ordered quickly. Shapes:
+  /// bins (n_samples, n_inputs), at most CodeWalk::kMostSamples.
   PairWalks(const coding::SelectiveDesensitization& code, std::span<const std::int32_t> bins)
       : code_(code),
         inputs_(code.n_inputs()),
@@ -78,20 +79,21 @@ class PairWalks {
       const std::size_t n_strips = 2 * n_wide_strips < n_bins ? n_wide_strips : n_bins;
       Input& input = inputs_[i];
       input.begins.resize(n_strips + 1);
-      std::vector<std::uint32_t> places(n_bins + 1);
+      // Counting sorts of the samples, by strips and by bins.
+      std::vector<std::uint32_t> next_of_bin(n_bins + 1);
       for (std::size_t s = 0; s < order_.size(); ++s) {
         const std::int32_t bin = bins[s * inputs_.size() + i];
         input.bins.push_back(bin);
         input.strips.push_back(
             static_cast<std::uint32_t>(static_cast<std::uint64_t>(bin) * n_strips / n_bins));
         ++input.begins[input.strips[s] + 1];
-        ++places[static_cast<std::size_t>(bin) + 1];
+        ++next_of_bin[static_cast<std::size_t>(bin) + 1];
       }
       std::partial_sum(input.begins.begin(), input.begins.end(), input.begins.begin());
-      std::partial_sum(places.begin(), places.end(), places.begin());
+      std::partial_sum(next_of_bin.begin(), next_of_bin.end(), next_of_bin.begin());
       input.sorted.resize(order_.size());
       for (std::size_t s = 0; s < order_.size(); ++s) {
-        input.sorted[places[static_cast<std::size_t>(input.bins[s])]++] =
+        input.sorted[next_of_bin[static_cast<std::size_t>(input.bins[s])]++] =
             static_cast<std::uint32_t>(s);
       }
     }
@@ -101,14 +103,14 @@ class PairWalks {
   void find(const PairChunk& chunk, CodeWalk& walk) {
     const Input& input = inputs_[chunk.input];
     const Input& other = inputs_[chunk.other_input];
-    walk.places.resize(order_.size());
+    walk.step_of_sample.resize(order_.size());
     codes_.clear();
     std::pair last{-1, -1};
     sort(input, other);
     for (const std::uint32_t sample : order_) {
       const std::pair now{input.bins[sample], other.bins[sample]};
       if (now != last) add_code(chunk, sample);
-      walk.places[sample] = static_cast<std::uint16_t>(codes_.size() - 1);
+      walk.step_of_sample[sample] = static_cast<std::uint16_t>(codes_.size() - 1);
       last = now;
     }
     walk.steps.resize(codes_.size());
@@ -185,7 +187,7 @@ class ChunkSums {
       read_rows(k, rows_.data());
       Weight* const sums = sums_.data() + n * n_samples_ * width;
       sum_steps(rows_.data(), width, walks[k], sums);
-      added[n++] = {sums, walks[k].places.data()};
+      added[n++] = {sums, walks[k].step_of_sample.data()};
       if (n < n_chunks_ && k + 1 < walks.size()) continue;
       add_step_sums(std::span<const StepSums<Weight>>(added).first(n), width, n_samples_,
                     potentials, stride);

@@ -58,6 +58,7 @@ class PlainTraining {
     layer_->tiles().add_columns(slots_.columns(), std::size_t{1} << 30, potentials_.data());
   }
 
+  /// Adds direction * x_SD to a unit's weights, and subtracts direction from its threshold.
   void correct(const Correction& correction) {
     auto& tiles = layer_->tiles();
     std::int32_t* const first = &tiles.at(correction.unit, 0);

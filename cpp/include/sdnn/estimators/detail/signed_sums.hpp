@@ -56,6 +56,8 @@ SDNN_INLINE void add_signed_at(To* to, std::size_t at, const SignedRows<Entry>& 
                                 SDNN_INLINE_LAMBDA { sum[r].add_to(to + r * Register::kSize); });
 }
 
+/// Adds and subtracts rows, `n_per_sum` at a time; four registers, one register, then single
+/// entries.
 template <class To, class Entry>
 SDNN_INLINE void add_signed_body(To* to, std::size_t size, const SignedRows<Entry>& rows,
                                  std::size_t offset, std::size_t n_per_sum) noexcept {
@@ -93,6 +95,7 @@ SDNN_INLINE void add_row_body(std::int32_t* to, const Product* row, std::int32_t
   }
 }
 
+/// Writes the entries of a code as bytes, in chunks of words; see expand_code below.
 SDNN_INLINE void expand_code_body(const coding::TernaryCode& code,
                                   std::span<const std::size_t> words, std::size_t chunk_words,
                                   std::int8_t* entries, std::size_t chunk_stride) noexcept {

@@ -61,6 +61,7 @@ struct ShortBlock {
   static constexpr std::size_t kRows = 16;
   static constexpr std::size_t kColumns = 8;
 
+  /// Interleaves rows with rows, pairs of rows with pairs, and fours with fours.
   SDNN_INLINE static void transpose(const std::int16_t* from, std::size_t from_stride,
                                     std::int16_t* to, std::size_t to_stride) noexcept {
     Shorts rows[8];
@@ -94,13 +95,13 @@ struct WordBlock {
   static constexpr std::size_t kRows = 8;
   static constexpr std::size_t kColumns = 8;
 
+  /// Interleaves rows with rows and pairs of rows with pairs, then joins halves of registers.
   SDNN_INLINE static void transpose(const std::int32_t* from, std::size_t from_stride,
                                     std::int32_t* to, std::size_t to_stride) noexcept {
     Words rows[8];
     core::unrolled<8>([&](std::size_t r)
                           SDNN_INLINE_LAMBDA { rows[r].load(from + r * from_stride); });
-    LongWords pairs[8];
-    LongWords fours[8];
+    LongWords pairs[8], fours[8];
     core::unrolled<4>([&](std::size_t k) SDNN_INLINE_LAMBDA {
       pairs[k] = as<LongWords>(low_turns(rows[2 * k], rows[2 * k + 1]));
       pairs[k + 4] = as<LongWords>(high_turns(rows[2 * k], rows[2 * k + 1]));

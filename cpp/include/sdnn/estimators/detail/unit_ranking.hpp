@@ -23,6 +23,7 @@ SDNN_INLINE std::int32_t count_firing_body(const std::int32_t* potentials,
   return count;
 }
 
+/// Computes a key for each unit, whose order is by distance and then index; see rank_units below.
 SDNN_INLINE std::int32_t rank_units_body(const std::int32_t* potentials, std::size_t size,
                                          bool firing, int n_bits, std::int32_t limit,
                                          std::int32_t* keys) noexcept {
@@ -62,6 +63,7 @@ SDNN_INLINE std::int32_t rank_units_body(const std::int32_t* potentials, std::si
   return least;
 }
 
+/// The smallest value above `floor`, or INT32_MAX.
 SDNN_INLINE std::int32_t least_above_body(const std::int32_t* values, std::size_t size,
                                           std::int32_t floor) noexcept {
   constexpr std::int32_t kNone = std::numeric_limits<std::int32_t>::max();

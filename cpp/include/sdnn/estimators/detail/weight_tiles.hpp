@@ -41,6 +41,7 @@ SDNN_INLINE void for_width(std::size_t width, const Function& function) noexcept
 
 using Slots = std::span<const std::uint32_t>;
 
+/// Adds and subtracts rows of a tile of constant width, `n_per_sum` at a time in its own type.
 template <class Weight, std::size_t Width>
 SDNN_INLINE void add_rows_of_width(const Weight* tile, Slots plus, Slots minus,
                                    std::size_t n_per_sum, std::int32_t* sums) noexcept {
@@ -68,6 +69,7 @@ SDNN_INLINE void add_rows_of_width(const Weight* tile, Slots plus, Slots minus,
   }
 }
 
+/// Calls add_rows_of_width with the width as a constant, so that its loops are unrolled.
 template <class Weight>
 SDNN_INLINE void add_rows_body(const Weight* tile, std::size_t width, Slots plus, Slots minus,
                                std::size_t n_per_sum, std::int32_t* sums) noexcept {
@@ -76,6 +78,7 @@ SDNN_INLINE void add_rows_body(const Weight* tile, std::size_t width, Slots plus
   });
 }
 
+/// Adds the outer product of a word of a code and coefficients of units to 64 rows.
 SDNN_INLINE void add_outer_body(std::int16_t* rows, std::size_t width,
                                 const std::int16_t* coefficients, std::uint64_t active,
                                 std::uint64_t positive) noexcept {
