@@ -18,6 +18,8 @@ auto& bound_part(auto& network) { return network; }
 
 }  // namespace
 
+/// Lists the networks or rules of an agent, one for each dimension, as views that keep `owner`
+/// alive.
 pybind11::list networks_of(agents::AnyAgent& agent, pybind11::handle owner) {
   pybind11::list networks;
   const auto add = [&](auto& of_kind) {

@@ -43,6 +43,7 @@ py::array_t<std::int8_t> transform(const Code& code, const Bins& bins) {
                                        [&](auto out) { coding::write_signs(code, values, out); });
 }
 
+/// The inner products of the codes of all rows of bins, with those of other bins if there are any.
 py::array_t<std::int32_t> gram(const Code& code, const Bins& bins,
                                const std::optional<Bins>& other_bins) {
   const auto values = copied(matrix(bins, "bins", code.n_inputs()));

@@ -106,6 +106,7 @@ struct Field {
 template <class Value>
 bool read_value(pybind11::handle source, Value& value, const Field& field);
 
+/// Reads a Python integer, or NumPy's. Returns false for other objects; throws if it is too large.
 template <std::integral Number>
 bool read_whole(pybind11::handle source, Number& value, const Field& field) {
   namespace py = pybind11;
@@ -128,6 +129,7 @@ bool read_whole(pybind11::handle source, Number& value, const Field& field) {
   return true;
 }
 
+/// Converts a Python object to a field's value. Returns false for an object of the wrong type.
 template <class Value>
 bool read_value(pybind11::handle source, Value& value, const Field& field) {
   namespace py = pybind11;

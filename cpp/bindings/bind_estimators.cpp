@@ -33,6 +33,7 @@ using estimators::ParallelPerceptron;
 
 std::size_t n_rows(const Bins& bins) { return static_cast<std::size_t>(bins.shape(0)); }
 
+/// Makes a layer with the weights and thresholds, or without them with random ones.
 std::shared_ptr<ParallelPerceptron> make_layer(
     const std::shared_ptr<coding::SelectiveDesensitization>& code, std::size_t n_units,
     std::uint64_t seed, const std::optional<ArrayArgument<std::int32_t>>& weights,
@@ -54,6 +55,7 @@ py::array_t<std::int32_t> thresholds_of(const ParallelPerceptron& layer) {
   return bindings::array_of(layer.thresholds());
 }
 
+/// The potentials of all units for each row of bins, computed without Python's lock.
 Matrix potentials_of(const ParallelPerceptron& layer, const Bins& bins, int n_threads) {
   const auto values = copied(matrix(bins, "bins", layer.code().n_inputs()));
   return bindings::filled<std::int32_t>({n_rows(bins), layer.n_units()}, [&](auto out) {
@@ -62,16 +64,18 @@ Matrix potentials_of(const ParallelPerceptron& layer, const Bins& bins, int n_th
   });
 }
 
+/// The number of firing units in each group for each row of bins, computed without Python's lock.
 Matrix counts_of(const ParallelPerceptron& layer, const Bins& bins, std::size_t n_groups,
                  int n_threads) {
   const auto values = copied(matrix(bins, "bins", layer.code().n_inputs()));
-  static_cast<void>(layer.group_size(n_groups));  // before an array of that many is asked for
+  static_cast<void>(layer.group_size(n_groups));  // throws before an array is allocated
   return bindings::filled<std::int32_t>({n_rows(bins), n_groups}, [&](auto out) {
     const bindings::WithoutGIL unlocked(layer);
     layer.counts(values, n_groups, n_threads, out);
   });
 }
 
+/// The counts of several layers of one code, which is computed once for all.
 py::array_t<std::int32_t> counts_of_all(
     const std::vector<std::shared_ptr<ParallelPerceptron>>& layers, const Bins& bins,
     std::size_t n_groups, int n_threads) {
@@ -82,13 +86,14 @@ py::array_t<std::int32_t> counts_of_all(
   }
   core::require(!layers.empty(), "layers", "at least one layer", layers.size());
   const auto values = copied(matrix(bins, "bins", layers[0]->code().n_inputs()));
-  static_cast<void>(layers[0]->group_size(n_groups));  // before an array of that many is asked for
+  static_cast<void>(layers[0]->group_size(n_groups));  // throws before an array is allocated
   return bindings::filled<std::int32_t>({layers.size(), n_rows(bins), n_groups}, [&](auto out) {
     const bindings::WithoutGIL unlocked(pointers);
     ParallelPerceptron::counts(pointers, values, n_groups, n_threads, out);
   });
 }
 
+/// LIBSDNN's tables of patterns as arrays of signs, after a check of their memory.
 py::tuple libsdnn_tables(int n_units, const std::vector<std::pair<int, int>>& inputs,
                          const ArrayArgument<std::int32_t>& pairs,
                          const std::vector<std::uint32_t>& seed, const std::string& library) {
@@ -141,6 +146,7 @@ estimators::PerceptronRule perceptron_rule(const ParallelPerceptron& layer,
           estimators::class_scheme_named(scheme)};
 }
 
+/// The potentials of an online layer's units for each row of bins.
 Matrix online_potentials_of(const estimators::OnlineLayer& layer, const Bins& bins) {
   const auto values = copied(matrix(bins, "bins", layer.layer().code().n_inputs()));
   return bindings::filled<std::int32_t>({n_rows(bins), layer.layer().n_units()}, [&](auto out) {
@@ -149,6 +155,7 @@ Matrix online_potentials_of(const estimators::OnlineLayer& layer, const Bins& bi
   });
 }
 
+/// Lets a layer learn rows of bins; returns the numbers of corrected samples and units.
 template <class Rule>
 std::pair<std::size_t, std::size_t> present_online(estimators::OnlineLayer& layer, const Bins& bins,
                                                    Rule rule) {

@@ -76,6 +76,7 @@ py::array_t<Value> column(const Trial& trial, Read read) {
   });
 }
 
+/// The rows of a trial's test episodes, as a dictionary of columns.
 py::typing::Dict<py::str, py::array> test_rows(const Trial& trial) {
   using tools::TestRow;
   py::typing::Dict<py::str, py::array> rows;
@@ -87,6 +88,7 @@ py::typing::Dict<py::str, py::array> test_rows(const Trial& trial) {
   return rows;
 }
 
+/// How often an SDNN-C computed potentials in full or from a neighbour, and the columns it added.
 py::typing::Dict<py::str, py::int_> cache_counts(const Trial& trial) {
   const auto* const agent = std::get_if<QLearning<SDNNC>>(&trial.agent().agent());
   if (agent == nullptr) throw std::invalid_argument("trial must be one of SDNN-C");

@@ -20,6 +20,7 @@ std::string compiler() {
 #endif
 }
 
+/// Raises a Python error of this type whose attribute `argument` names the bad argument.
 void set_error(PyObject* kind, const auto& error) {
   namespace py = pybind11;
   py::object raised = py::handle(kind)(error.what());

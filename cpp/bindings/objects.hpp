@@ -142,6 +142,7 @@ class WithoutGIL {
   WithoutGIL& operator=(const WithoutGIL&) = delete;
 
  private:
+  /// The uses, by this reader, of whole objects and of arrays inside objects.
   template <class Object, class Part>
   std::vector<Use> of_all(const std::vector<Object*>& objects,
                           const std::vector<std::span<Part>>& parts) const {

@@ -34,8 +34,7 @@ class PlainRBFNetwork {
 
   struct Workspace {
     approximators::RBFNetwork::Workspace network;
-    std::vector<double> state_exponents;
-    std::vector<double> exponents;
+    std::vector<double> state_exponents, exponents;
   };
   Workspace workspace() const {
     return {network_.workspace(),

@@ -61,8 +61,7 @@ Times time_each(int n_repetitions, Prepare&& prepare, Timed&& timed, bool is_alo
   Times times(static_cast<std::size_t>(n_repetitions));
   for (int i = 0; i < n_repetitions; ++i) {
     prepare(i);
-    const std::int64_t running = is_alone ? thread_time() : 0;
-    const std::int64_t begin = now();
+    const std::int64_t running = is_alone ? thread_time() : 0, begin = now();
     timed(i);
     std::int64_t& time = times[static_cast<std::size_t>(i)];
     time = now() - begin;

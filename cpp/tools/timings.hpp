@@ -124,8 +124,7 @@ class NetworkParts {
   approximators::SDNNC network_;
   core::Random random_;
   approximators::SDNNC::Workspace workspace_;
-  std::vector<double> state_;
-  std::vector<double> values_;
+  std::vector<double> state_, values_;
   std::vector<std::int32_t> potentials_;
 };
 
@@ -198,8 +197,7 @@ class AcrobotDecisions {
 template <agents::Agent Agent>
 Times time_agent_steps(Agent& agent, int n_repetitions, std::uint64_t seed) {
   core::Random random(seed, core::Stream::exploration);
-  std::vector<double> before(agent.n_inputs());
-  std::vector<double> state(agent.n_inputs());
+  std::vector<double> before(agent.n_inputs()), state(agent.n_inputs());
   const auto draw_state = [&] {
     for (double& value : state) value = random.uniform();
   };

@@ -198,6 +198,7 @@ class AcrobotTrial {
     return true;
   }
 
+  /// Begins a learning or a test episode, with the goal tolerance of the learning episode.
   void begin_episode() {
     if (!is_test_) {
       if constexpr (requires { agent_.set_progress(0.0); }) {
@@ -242,15 +243,13 @@ class AcrobotTrial {
   static constexpr double kStepsPerPoint = 1 << 20;  ///< integration steps
 
   Agent agent_;
-  double max_torque_;
-  double steps_per_decision_;
+  double max_torque_, steps_per_decision_;
   environments::Acrobot acrobot_;
   environments::GoalSchedule goal_;
   environments::AcrobotSensors sensors_;
   environments::AcrobotSensors test_sensors_;
   ProtocolConfig protocol_;
-  std::vector<double> observed_;
-  std::vector<double> next_observed_;
+  std::vector<double> observed_, next_observed_;
   std::vector<TestRow> rows_;
   std::int64_t n_decisions_ = 0;
   int episode_ = 0;

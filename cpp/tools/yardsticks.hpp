@@ -104,11 +104,8 @@ class DenseProduct {
     return static_cast<float>(2.0 * random.uniform() - 1.0);
   }
 
-  std::size_t n_rows_;
-  std::size_t n_columns_;
-  core::AlignedBuffer<float> weights_;
-  core::AlignedBuffer<float> input_;
-  core::AlignedBuffer<float> out_;
+  std::size_t n_rows_, n_columns_;
+  core::AlignedBuffer<float> weights_, input_, out_;
 };
 
 }  // namespace sdnn::tools
