@@ -12,15 +12,16 @@ namespace {
 
 const std::vector<std::uint8_t> kMask{0, 1, 0, 1, 1, 0, 1};
 
+// A mask has the actions of all dimensions one after the other; take_part cuts off the first ones.
 TEST(ActionMask, IsSplitIntoPartsOfDimensions) {
   ActionMask left = kMask;
   EXPECT_EQ(take_part(left, 3).size(), 3U);
   EXPECT_EQ(left.size(), 4U);
   EXPECT_TRUE(allows(left, 0));
   EXPECT_FALSE(allows(left, 2));
-  ActionMask all;
-  EXPECT_TRUE(take_part(all, 3).empty());
-  EXPECT_TRUE(allows(all, 2));
+  ActionMask empty;  // allows all actions
+  EXPECT_TRUE(take_part(empty, 3).empty());
+  EXPECT_TRUE(allows(empty, 2));
 }
 
 TEST(ActionMask, DrawsEachAllowedAction) {  // actions 1, 3, 4 and 6, of which draw(n) picks one

@@ -82,8 +82,9 @@ TEST(Actions, RefuseBadConfigurationsByTheirField) {
   for (const ActionConfig& bad :
        {ActionConfig{.low = {0.0}, .high = {1.0, 2.0}}, ActionConfig{.low = {0.0}, .high = {0.0}},
         ActionConfig{.low = {0.0}, .high = {testing::kInfinity}},
+        // Doubles beyond 2^53 are not all integers; there are at most 2^20 discrete actions.
         ActionConfig{.low = {0.0}, .high = {1e17}, .number = ActionNumber::whole},
-        ActionConfig{.low = {0.0}, .high = {1048576.0}, .discrete = true},
+        ActionConfig{.low = {0.0}, .high = {0x1p20}, .discrete = true},
         ActionConfig{.low = {0.0}, .high = {-1.0}, .discrete = true},
         ActionConfig{.low = {0.0}, .high = {0.5}, .discrete = true}}) {
     EXPECT_NE(error_of(bad, 3).find("action.high"), std::string::npos) << error_of(bad, 3);

@@ -89,6 +89,8 @@ TEST(ActorCritic, ProbabilitiesDoNotDependOnTheScaleOfRewards) {
   }
 }
 
+// Environment 0 rewards action 0 in state a, environment 1 punishes action 1 in state b, in turns.
+// In a joint trace each reward would also change the other state's preferences.
 TEST(ActorCritic, EnvironmentsHaveSeparateTraces) {
   ActorCritic agent = actor_critic_of({});
   agent.set_n_environments(2);
@@ -102,6 +104,7 @@ TEST(ActorCritic, EnvironmentsHaveSeparateTraces) {
   EXPECT_THROW(agent.begin_episode(2), std::invalid_argument);
 }
 
+// The agent has 3 actions and 1 environment; rewards are up to 1e300, and states in [0, 1].
 TEST(ActorCritic, RefusesBadTransitionsAndChangesNothing) {
   ActorCritic agent = actor_critic_of({});
   learn_at_random(agent, 50, 1);

@@ -194,7 +194,9 @@ TEST(CompiledController, NamesWhatIsWrongWithASetting) {
   EXPECT_NE(size.find("max_table_bytes is 1000"), std::string::npos) << size;
 }
 
-TEST(CompiledController, MissingReadingsThatHaveAPatternExcludeAHistoryByDefault) {
+// A history computes with readings, so it needs a number for each. With missing = "code" there is
+// none, and the preset's history is left out; one that the user sets is an error.
+TEST(CompiledController, CodedMissingReadingsLeaveOutThePresetsHistory) {
   EXPECT_EQ(error_of_setting("observation.missing", "code"), "no error");
   EXPECT_NE(error_with([](AgentSpec& spec) {
               spec.settings = {{"observation.missing", "code"}, {"observation.history", "auto"}};

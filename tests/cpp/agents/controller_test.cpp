@@ -128,11 +128,12 @@ TEST(Controller, ContinuesExactlyAfterItWasSavedAtAnyStep) {
   }
 }
 
+// The pendulum's four variables are three inputs; each of two dimensions of actions has a network.
 TEST(Controller, ActsAndLearnsLikeItsAgent) {
   RBFNetworkConfig bases = kBases;
   bases.n_inputs = 3;
-  const RBFNetwork part(bases);
-  QLearning<RBFNetwork> agent({part, part}, {}, 3);
+  const RBFNetwork network(bases);
+  QLearning<RBFNetwork> agent({network, network}, {}, 3);
   Controller controller(rbf_of_vectors());
   EXPECT_EQ(controller.n_variables(), 4U);
   EXPECT_EQ(controller.n_dimensions(), 2U);
@@ -163,15 +164,15 @@ TEST(Controller, GivesTheSameActionsToConcurrentReaders) {
     core::Random random(5, core::Stream::weights);
     Numbers observed{1.0, 0.0, 0.0, 0.0};
     for (int t = 0; t < 60; ++t) step(controller, random, observed, false);
-    const Controller& read = controller;
+    const Controller& shared = controller;
     const auto best = [&](std::size_t i) -> Numbers {
-      auto workspace = read.workspace();
-      core::Random ties(i % 2, core::Stream::ties), places(7, core::Stream::weights);
+      auto workspace = shared.workspace();
+      core::Random ties(i % 2, core::Stream::ties), observations(7, core::Stream::weights);
       Numbers actions;
       for (int t = 0; t < 50; ++t) {
-        const Numbers observation{1.0, 0.0, 16.0 * places.uniform() - 8.0,
-                                  10.0 + 4.0 * places.uniform()};
-        const auto action = read.best_action(observation, workspace, ties);
+        const Numbers observation{1.0, 0.0, 16.0 * observations.uniform() - 8.0,
+                                  10.0 + 4.0 * observations.uniform()};
+        const auto action = shared.best_action(observation, workspace, ties);
         actions.insert(actions.end(), action.begin(), action.end());
       }
       return actions;
@@ -183,10 +184,10 @@ TEST(Controller, GivesTheSameActionsToConcurrentReaders) {
 
     Controller same = controller;
     auto workspace = controller.workspace();
-    core::Random places(7, core::Stream::weights);
+    core::Random observations(7, core::Stream::weights);
     for (int t = 0; t < 50; ++t) {
-      const Numbers observation{1.0, 0.0, 16.0 * places.uniform() - 8.0,
-                                10.0 + 4.0 * places.uniform()};
+      const Numbers observation{1.0, 0.0, 16.0 * observations.uniform() - 8.0,
+                                10.0 + 4.0 * observations.uniform()};
       controller.read(controller.prepare(observation, 0), workspace);
       EXPECT_TRUE(
           std::ranges::equal(controller.best_of(workspace, 0), same.act(observation, false)));
@@ -246,6 +247,8 @@ TEST(Controller, LearnsTheIndexThatWasTakenOfEqualRoundedActions) {
   }
 }
 
+// Observations have 4 variables, actions one or two numbers in [-2, 2], and rewards are up to
+// 1e300.
 TEST(Controller, RefusesBadArgumentsAndChangesNothing) {
   const Numbers good(4, 0.5), shorter(3, 0.5), nan = {0.5, 0.5, testing::kNaN, 0.5};
   for (ControllerConfig config :
@@ -286,6 +289,7 @@ TEST(Controller, RefusesInconsistentStates) {
   refused(more);
   refused(testing::with_number(good, "progress", 1.5));
   refused(testing::with_number<std::uint8_t>(good, "is_warming_up", 2));
+  // The controller has taken one of five actions in its only environment, number 0.
   refused(testing::with_number<std::int64_t>(good, "taken.indices", 5));
   refused(testing::with_number<std::int64_t>(good, "taken.indices", -1));
   refused(testing::with_number<std::int64_t>(good, "taken.environments", 1));
@@ -312,10 +316,11 @@ TEST(Controller, RefusesStatesOfWrongSizeBeforeItAllocatesMemory) {
 
 TEST(Controller, KeepsCustomPatternsForOneDimensionOfActionsOnly) {
   ControllerConfig config = sdnn();
-  std::vector<coding::PatternTable> tables;
+  constexpr int kBins = 4, kPatternUnits = 16;
   std::vector<std::int8_t> signs;
-  for (int k = 0; k < 4 * 16; ++k) signs.push_back(k % 3 == 0 ? 1 : -1);
-  for (int i = 0; i < 3; ++i) tables.push_back(coding::PatternTable::from_signs(signs, 4, 16));
+  for (int k = 0; k < kBins * kPatternUnits; ++k) signs.push_back(k % 3 == 0 ? 1 : -1);
+  const std::vector tables(  // a table of patterns for each of the pendulum's three inputs
+      3, coding::PatternTable::from_signs(signs, kBins, kPatternUnits));
   const Controller controller(config, tables);
   const core::State state = core::state_of(controller);
   EXPECT_TRUE(state.contains("table.2"));
@@ -326,13 +331,13 @@ TEST(Controller, KeepsCustomPatternsForOneDimensionOfActionsOnly) {
 
 TEST(Controller, RefusesImpossibleSettingsBeforeItsWarmUp) {
   ControllerConfig config = with_warm_up(rbf_config());
-  std::get<RBFNetworkConfig>(config.approximator).n_bases = 1;
+  std::get<RBFNetworkConfig>(config.approximator).n_bases = 1;  // at least 2
   EXPECT_THROW(Controller{config}, std::invalid_argument);
   config = with_warm_up(rbf_config());
-  config.warm_up_steps = 1;
+  config.warm_up_steps = 1;  // at least 2
   EXPECT_THROW(Controller{config}, std::invalid_argument);
   config = rbf_config();
-  config.learning = kTraces;
+  config.learning = kTraces;  // settings of fuzzy Q-learning
   EXPECT_THROW(Controller{config}, std::invalid_argument);
 }
 

@@ -111,8 +111,7 @@ TEST(EpsilonGreedy, FirstStepsAreGreedyAndLaterOnesRandomWithProbabilityEpsilon)
   EpsilonGreedy policy({}, 2);  // epsilon 0.1 after 10 steps
   Row values(50, 0.0);
   values[7] = 1.0;
-  int others_early = 0;
-  int others_late = 0;
+  int others_early = 0, others_late = 0;
   const int n = 20000;
   for (int i = 0; i < n; ++i) {
     others_early += policy.select(values, i % 10, true) != 7;

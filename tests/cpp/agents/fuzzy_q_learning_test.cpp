@@ -123,6 +123,7 @@ TEST(FuzzyQLearning, RefusesTracesThatDoNotDecay) {
             "trace_decay must be at most 0.99 / discount, got 1");
 }
 
+// 2^16 rules fire in each step, and a trace that decays by 0.99 lasts for hundreds of steps.
 TEST(FuzzyQLearning, RefusesTooManyTracesBeforeItAllocatesMemory) {
   const FuzzyRules rules({.n_inputs = 16, .n_sets = 2, .n_actions = 2});
   EXPECT_THROW(Fuzzy(rules, {.discount = 1.0, .trace_decay = 0.99}, 1), std::length_error);
@@ -229,6 +230,7 @@ TEST(FuzzyQLearning, ARestoredStateWithoutAnActionForgetsTheLastOne) {
   EXPECT_EQ(agent.act(state), action);
 }
 
+// The agent has 4^2 rules, of which 2^2 fire in a step, and 5 actions.
 TEST(FuzzyQLearning, RefusesInconsistentStates) {
   Fuzzy agent = traced_agent();
   agent.begin_episode();
@@ -239,7 +241,7 @@ TEST(FuzzyQLearning, RefusesInconsistentStates) {
   (void)agent.act(State{0.2, 0.3});
   testing::expect_that_damage_is_refused(agent);
   const core::State good = core::state_of(agent);
-  ASSERT_EQ(good.at("eligibilities").size(), 8U);  // two steps, in each of which 2^2 rules fired
+  ASSERT_EQ(good.at("eligibilities").size(), 2U * 4);  // of two steps
   using testing::with_number;
   const auto refused = [&](const core::State& bad, const std::string& message) {
     testing::expect_refused(agent, bad, "state: " + message);
@@ -266,7 +268,7 @@ FuzzyRules small_rules() { return FuzzyRules({.n_inputs = 2, .n_sets = 4, .n_act
 constexpr FuzzyQLearningConfig kTraced{.trace_decay = 0.7,
                                        .policy = {.epsilon = 0.3, .n_greedy_steps = 0}};
 
-Fuzzy part(std::uint64_t seed) { return {small_rules(), kTraced, seed}; }
+Fuzzy agent_of_one(std::uint64_t seed) { return {small_rules(), kTraced, seed}; }
 
 FuzzyQLearning agent_of_two() {
   return {std::vector<FuzzyRules>{small_rules(), small_rules()}, kTraced, 1};
@@ -274,7 +276,7 @@ FuzzyQLearning agent_of_two() {
 
 TEST(FuzzyQLearning, DimensionsOfAnActionLearnLikeSeparateAgents) {
   FuzzyQLearning both = agent_of_two();
-  Fuzzy first = part(1), second = part(seed_of_dimension(1, 1));
+  Fuzzy first = agent_of_one(1), second = agent_of_one(seed_of_dimension(1, 1));
   EXPECT_EQ(both.n_dimensions(), 2U);
   EXPECT_EQ(both.n_inputs(), 2U);
   Numbers state = {0.2, 0.9};

@@ -128,9 +128,11 @@ TEST(History, AveragesMoveByAHalfAndAFifthOfTheDistance) {
 }
 
 TEST(History, SteadyGainsSolveTheRiccatiEquation) {
-  const double drift = 0.3, expected = (drift + std::sqrt(drift * drift + 4.0 * drift)) / 2.0;
-  EXPECT_NEAR(detail::steady_gains({1.0}, {2.0}, drift)[0], expected / (expected + 1.0), 1e-12);
-  // SciPy's solve_discrete_are gives the second ones.
+  // For a constant number with noise of variance r, the predicted variance p r solves
+  // p = p - p^2 / (p + 1) + drift, hence p^2 - drift p - drift = 0. The gain is p / (p + 1).
+  const double drift = 0.3, p = (drift + std::sqrt(drift * drift + 4.0 * drift)) / 2.0;
+  EXPECT_NEAR(detail::steady_gains({1.0}, {2.0}, drift)[0], p / (p + 1.0), 1e-12);
+  // For two variables, SciPy's solve_discrete_are gave the numbers.
   const Numbers gains = detail::steady_gains({1.0, 0.2, 0.0, 0.9}, {1.0, 2.0}, 0.1);
   const Numbers solved{0.31048834, 0.03958821, 0.07917642, 0.20620367};
   for (std::size_t k = 0; k < 4; ++k) EXPECT_NEAR(gains[k], solved[k], 1e-8) << k;
@@ -140,7 +142,7 @@ TEST(History, AnObserverReducesTheErrorOfNoisySensors) {
   constexpr std::size_t kSteps = 1000;
   const Mass learned = pushed_mass(kSteps, 0.05, 1), fresh = pushed_mass(kSteps, 0.05, 2);
   const HistoryFilter filter(History::observer, learned.experience, {0, 0}, 1);
-  EXPECT_LT(filter.gain(), 1.0);
+  EXPECT_LT(filter.gain(), 1.0);  // it does not trust the sensors alone
   HistoryFilter::Memory memory;
   HistoryFilter::Room room;
   Numbers state(2);
@@ -196,20 +198,21 @@ TEST(History, ContinuesExactlyAfterItWasSavedAtAnyStep) {
        {History::differences, History::averages, History::observer, History::automatic}) {
     for (const bool is_running : {false, true}) {
       const ControllerConfig config = config_of(history, is_running);
-      Controller whole(config);
+      Controller uninterrupted(config);
       core::Random random(5, core::Stream::weights);
-      for (int part = 0; part < 8; ++part) {
-        (void)actions_of(whole, random, 50 + part);
-        Controller restored = Controller::restored(config, core::state_of(whole));
-        ASSERT_EQ(core::state_of(restored), core::state_of(whole));
+      for (int n_saved = 0; n_saved < 8; ++n_saved) {  // during the warm-up and after it
+        (void)actions_of(uninterrupted, random, 50 + n_saved);
+        Controller restored = Controller::restored(config, core::state_of(uninterrupted));
+        ASSERT_EQ(core::state_of(restored), core::state_of(uninterrupted));
         core::Random same = random;
-        ASSERT_EQ(actions_of(restored, same, 30), actions_of(whole, random, 30));
-        ASSERT_EQ(core::state_of(restored), core::state_of(whole));
+        ASSERT_EQ(actions_of(restored, same, 30), actions_of(uninterrupted, random, 30));
+        ASSERT_EQ(core::state_of(restored), core::state_of(uninterrupted));
       }
     }
   }
 }
 
+// Refused are any array of the history without its last element, and twice as many levels.
 TEST(History, RefusesInconsistentStates) {
   const ControllerConfig config = config_of(History::observer);
   Controller controller(config);
@@ -220,10 +223,10 @@ TEST(History, RefusesInconsistentStates) {
   for (const auto& [name, tensor] : state) {
     if (!name.starts_with("history.") && !name.starts_with("last_states.")) continue;
     core::State shorter = state;
-    core::Tensor& part = shorter.at(name);
-    if (part.shape.size() != 1 || part.shape[0] == 0) continue;
-    part.bytes.resize(part.bytes.size() / part.shape[0] * (part.shape[0] - 1));
-    --part.shape[0];
+    core::Tensor& array = shorter.at(name);
+    if (array.shape.size() != 1 || array.shape[0] == 0) continue;
+    array.bytes.resize(array.bytes.size() / array.shape[0] * (array.shape[0] - 1));
+    --array.shape[0];
     EXPECT_THROW((void)Controller::restored(config, shorter), std::invalid_argument) << name;
   }
   core::State more = state;
@@ -233,16 +236,15 @@ TEST(History, RefusesInconsistentStates) {
   EXPECT_THROW((void)Controller::restored(config, more), std::invalid_argument);
 }
 
-TEST(History, ReadingTransitionsLearnsTheSameWeightsAsActing) {
-  Controller actor(config_of(History::differences)), reader(config_of(History::differences));
+TEST(History, LearningWithoutActingGivesTheSameWeights) {
+  Controller actor(config_of(History::differences)), learner(config_of(History::differences));
   core::Random random(5, core::Stream::weights);
   Numbers observation{0.5, 0.5};
   actor.begin_episode();
-  reader.begin_episode();
+  learner.begin_episode();
   for (int t = 0; t < 600; ++t) {
-    const Numbers action{actor.act(observation)[0]};
-    const Numbers next{random.uniform(), random.uniform()};
-    for (Controller* const agent : {&actor, &reader}) {
+    const Numbers action{actor.act(observation)[0]}, next{random.uniform(), random.uniform()};
+    for (Controller* const agent : {&actor, &learner}) {
       agent->learn(observation, action, next[0], next, false);
     }
     observation = next;
@@ -250,9 +252,10 @@ TEST(History, ReadingTransitionsLearnsTheSameWeightsAsActing) {
   const auto weights = [](const Controller& agent) {
     return core::state_of(std::get<QLambda>(agent.agent())).at("action_value.weights");
   };
-  EXPECT_EQ(weights(actor), weights(reader));
+  EXPECT_EQ(weights(actor), weights(learner));
 }
 
+// With differences, inputs 2 and 3 of a state are the last changes, where 0.5 stands for none.
 TEST(History, GreedyEpisodesHaveASeparateMemory) {
   Controller controller(config_of(History::differences));
   core::Random random(5, core::Stream::weights);
@@ -358,8 +361,9 @@ TEST(History, AnAutomaticHistoryBeginsNoWarmUp) {
 TEST(History, SizesThatAHistoryMakesImpossibleAreRefusedAtOnce) {
   ControllerConfig config = config_of(History::differences);
   config.approximator = approximators::LinearSDNNConfig{.n_pattern_units = 2, .n_actions = 3};
+  // Custom patterns for the two readings leave the two differences without patterns.
   const std::vector<std::int8_t> signs{1, 1, -1, 1, -1, -1};
-  const std::vector tables(2, coding::PatternTable::from_signs(signs, 3, 2));
+  const std::vector tables(2, coding::PatternTable::from_signs(signs, /*n_bins=*/3, /*n_units=*/2));
   EXPECT_THROW(Controller(config, tables), std::invalid_argument);
   config.observation.history = History::automatic;
   EXPECT_NO_THROW(Controller(config, tables));

@@ -117,6 +117,7 @@ TEST(Imitation, GivesTheSameBitsOnEveryInstructionSetAndAfterASave) {
   expect_equal([] { return imitating_actor_critic({3, 5}); });
 }
 
+// Arguments are a state in [0, 1], one of 3 actions, a finite return, and a margin above 0.
 TEST(Imitation, RefusesBadActionsAndReturnsAndChangesNothing) {
   QLambda agent = q_lambda_of();
   agent.imitate(kState, Indices{0}, 1.0, 1.0);
@@ -138,6 +139,7 @@ ControllerConfig config_of(AnyApproximatorConfig approximator, AnyLearningConfig
           .warm_up_steps = 30};
 }
 
+// A teacher's transitions may end a warm-up early, which finds the range of the second variable.
 TEST(Imitation, RefusesToEndAWarmUpWithoutTransitionsOrTwice) {
   const LinearSDNNConfig small{.n_pattern_units = 20, .averaging_interval = 0};
   Controller agent(config_of(small, QLambdaConfig{}));

@@ -78,6 +78,7 @@ TEST(NStepBuffer, DiscountsBySquaresAndRootsForLongerAndShorterSteps) {
                           "state: dts must be in [0.001, 1000000]");
 }
 
+// Step 3 leads to the state 4 / 16; a transition from another state does not continue it.
 TEST(NStepBuffer, KnowsTheNextStateOfTheNewestStep) {
   NStepBuffer steps = buffer_of(2);
   EXPECT_TRUE(steps.is_continued_by(Numbers{0.9}));  // nothing is pending
@@ -88,6 +89,7 @@ TEST(NStepBuffer, KnowsTheNextStateOfTheNewestStep) {
   EXPECT_TRUE(steps.is_continued_by(Numbers{0.26}));
 }
 
+// Steps have the rewards 1, 2 and 4; each_is returns whether a condition is true of all of them.
 TEST(NStepBuffer, VisitsEachPendingStepOnce) {
   NStepBuffer steps = buffer_of(3);
   for (int i = 0; i < 3; ++i) add(steps, i);

@@ -53,6 +53,7 @@ TEST(ObservationScale, ScalesNumbersAndAnglesAsWorkedByHand) {
   EXPECT_EQ(scaled(scale, {0.0, 0.0, 1e308, -1e308})[1], 1.0);
 }
 
+// The middles of two bins are 1/4 and 3/4, those of three bins 1/6, 1/2 and 5/6.
 TEST(ObservationScale, ScalesOneHotSymbolsToTheMiddleOfTheirBin) {
   const ObservationScale scale = scale_of_symbols();
   EXPECT_EQ(scale.n_inputs(), 3U);
@@ -84,13 +85,15 @@ TEST(ObservationScale, MissingReadingsAreRefusedHeldOrCoded) {
                             {{ObservedKind::variable, 1, 0}, {ObservedKind::variable, 0, 0}},
                             missing, {3, 7});
   };
-  const ObservationScale plain = scale(Missing::error);
+  const ObservationScale refusing = scale(Missing::error);
   const Numbers missing{testing::kInfinity, testing::kNaN};
-  EXPECT_THROW(scaled(plain, missing), std::invalid_argument);
+  EXPECT_THROW(scaled(refusing, missing), std::invalid_argument);
   EXPECT_EQ(scaled(scale(Missing::hold), missing), (Numbers{0.5, 0.5}));
+  // Codes are middles of bins: the last of 4 and of 8; for -0.9 and 1 the first and the last but
+  // one.
   EXPECT_EQ(scaled(scale(Missing::code), missing), (Numbers{3.5 / 4.0, 7.5 / 8.0}));
   EXPECT_EQ(scaled(scale(Missing::code), {1.0, -0.9}), (Numbers{0.5 / 4.0, 6.5 / 8.0}));
-  EXPECT_FALSE(std::signbit(scaled(plain, {-0.0, 0.0})[1]));
+  EXPECT_FALSE(std::signbit(scaled(refusing, {-0.0, 0.0})[1]));
   const ObservationScale angles = scale_of_angles();
   for (const double bad : {testing::kNaN, testing::kInfinity}) {
     const Numbers observed{1.0, 2.0, bad, 3.0};
@@ -98,7 +101,7 @@ TEST(ObservationScale, MissingReadingsAreRefusedHeldOrCoded) {
     EXPECT_THROW(angles(observed, state), std::invalid_argument);
     EXPECT_EQ(state, Numbers(3, 7.0));
   }
-  EXPECT_THROW(scaled(plain, {0.0, testing::kNaN}), std::invalid_argument);
+  EXPECT_THROW(scaled(refusing, {0.0, testing::kNaN}), std::invalid_argument);
   EXPECT_THROW(scaled(angles, {1.0, 2.0, 3.0}), std::invalid_argument);
 }
 

@@ -101,22 +101,24 @@ TEST(Observations, RangesMoreThanTwiceTooWideAreNarrowedForUpToFourInputs) {
   EXPECT_EQ(range(-100.0, 100.0, {0.0, 4.0}, 5), std::pair(-100.0, 100.0));
 }
 
+// An angle, its cosine, its sine and the cosine again: variables 1 and 2 are a pair. Without
+// movement no circle can be seen.
 TEST(Observations, FindPairsOnACircleAsAngles) {
   ObservationConfig config{.low = Ends(4, -10.0), .high = Ends(4, 10.0), .find_angle_pairs = true};
-  Numbers observed, standing;
+  Numbers observed, motionless;
   for (int t = 0; t < 40; ++t) {
     const double angle = 5.0 * t / 39.0;
     for (const double x : {angle, std::cos(angle), std::sin(angle), std::cos(angle)}) {
       observed.push_back(x);
     }
-    for (const double x : {1.0, 0.0, 1.0, 0.0}) standing.push_back(x);
+    for (const double x : {1.0, 0.0, 1.0, 0.0}) motionless.push_back(x);
   }
   const auto observations = fitted(config, observed);
   EXPECT_EQ(kinds_of(observations),
             (std::vector{ObservedKind::variable, ObservedKind::angle, ObservedKind::variable}));
   EXPECT_EQ(observations.circular(), (std::vector<bool>{false, true, false}));
   EXPECT_EQ(low_of(observations), (Numbers{-10.0, -1.0, -1.0, -10.0}));
-  EXPECT_EQ(fitted(config, standing).n_inputs(), 4U);
+  EXPECT_EQ(fitted(config, motionless).n_inputs(), 4U);
   config.angles = {2};  // is no part of a pair then
   EXPECT_EQ(fitted(config, observed).n_inputs(), 4U);
 }
@@ -196,10 +198,11 @@ TEST(Observations, AppendInputsThatAreAddedLaterAndRestoreThem) {
   core::restore(second, good);
   EXPECT_EQ(variables(second), variables(first));
   EXPECT_EQ(second.n_first_inputs(), 2U);
+  // The first of the kept inputs 1, 3, 0, 4 of five: no input, one of the others, beyond the last.
   for (const std::int32_t bad : {-1, 3, 5}) {
     testing::expect_refused(first, testing::with_number(good, "kept", bad), "state: kept");
   }
-  for (const std::uint64_t bad : {0U, 5U}) {
+  for (const std::uint64_t bad : {0U, 5U}) {  // of four kept inputs
     testing::expect_refused(first, testing::with_number(good, "n_first", bad), "state: n_first");
   }
   testing::expect_refused(first, testing::with_number<std::int32_t>(good, "kept", 4),

@@ -153,6 +153,7 @@ TEST(QLambda, TheToleranceOfTiesIsInUnitsOfValues) {
   }
 }
 
+// The tolerance makes all allowed actions tie, of which the lowest is taken.
 TEST(QLambda, MaskedActionsNeverTie) {
   const State a{0.1, 0.1};
   QLambda agent = agent_of(with_tolerance(1e308));
@@ -160,6 +161,7 @@ TEST(QLambda, MaskedActionsNeverTie) {
   EXPECT_EQ(agent.act(a, true, 0, std::vector<std::uint8_t>{0, 1, 1}).front(), 1U);
 }
 
+// A mask has 0 or 1 for each of 3 + 2 actions, and allows at least one in both dimensions.
 TEST(QLambda, RefusesMasksOfWrongSizeOrValues) {
   QLambda agent = agent_of({}, {3, 2});
   auto workspace = agent.workspace();
@@ -239,6 +241,8 @@ TEST(QLambda, EveryEndOfAnEpisodeHalvesTheLongestRandomActionDownToFiveSteps) {
   EXPECT_EQ(longest_action(agent(3), 7), 3);
 }
 
+// In long episodes some explorations are excursions: several steps of actions with the lowest
+// value, so that an agent that would stay in good states learns about others.
 TEST(QLambda, StepsOfExcursionsAreTheWorstOnesAndAreLearnedOnlyIfTheyTerminate) {
   QLambda agent = agent_of({.max_action_repeat = 20}, {5}, 2);
   learn_at_random(agent, 100, 2);
@@ -265,6 +269,7 @@ TEST(QLambda, StepsOfExcursionsAreTheWorstOnesAndAreLearnedOnlyIfTheyTerminate) 
   EXPECT_LT(n_left_out, 1500);
 }
 
+// Ended episodes are counted up to 20.
 TEST(QLambda, RefusesStatesWithAnImpossibleNumberOfEndedEpisodes) {
   QLambda ended = agent_of({.max_action_repeat = 100}, {250, 250});
   for (int i = 0; i < 40; ++i) ended.learn({{0.5, 0.5}}, Indices{0, 0}, 1.0, {{0.5, 0.5}}, true);
@@ -305,6 +310,7 @@ TEST(QLambda, EnvironmentsHaveSeparateTraces) {
   EXPECT_THROW(together.learn(a, Indices{0}, 0.0, b, false, 1), std::invalid_argument);
 }
 
+// Dutch traces need the value before the last correction, which other environments would change.
 TEST(QLambda, DutchTracesAreReplacingOnesInSeveralEnvironments) {
   const auto state_after = [](TraceKind traces, std::size_t n_environments) {
     QLambda agent = agent_of({.traces = traces});
@@ -322,6 +328,7 @@ TEST(QLambda, DutchTracesAreReplacingOnesInSeveralEnvironments) {
   EXPECT_NE(state_after(TraceKind::dutch, 1), state_after(TraceKind::replacing, 1));
 }
 
+// The agent has 2 inputs in [0, 1] and 3 actions of one dimension; rewards are up to 1e300.
 TEST(QLambda, RefusesBadTransitionsAndSettingsAndLearnsNothing) {
   QLambda agent = agent_of({});
   const State a{0.1, 0.1};

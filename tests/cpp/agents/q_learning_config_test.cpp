@@ -27,7 +27,7 @@ TEST(QLearning, RatesChangeLinearlyWithProgress) {
   EXPECT_EQ(agent.learning_rate(), 0.75 * 0.5 + 0.25 * 0.25);
   EXPECT_EQ(agent.epsilon(), 0.75 * 0.75);
   agent.learn(cell(0), 0, 16.0, cell(1), true);
-  EXPECT_EQ(agent.network().value(cell(0), 0), 0.4375 * 16.0);
+  EXPECT_EQ(agent.network().value(cell(0), 0), 0.4375 * 16.0);  // at this learning rate
   agent.set_progress(1.0);
   EXPECT_EQ(agent.learning_rate(), 0.25);
   EXPECT_EQ(agent.epsilon(), 0.0);
@@ -73,8 +73,7 @@ TEST(QLearning, AnExponentialScheduleStaysBetweenItsFirstAndLastValue) {
     const double last = i % 3 == 0 ? first : 1e-300 + random.uniform() * random.uniform();
     const QLearningConfig config{
         .learning_rate = first, .final_learning_rate = last, .schedule = Schedule::exponential};
-    const double progress = random.uniform();
-    const double rate = learning_rate_at(config, progress);
+    const double progress = random.uniform(), rate = learning_rate_at(config, progress);
     ASSERT_GE(rate, std::min(first, last));
     ASSERT_LE(rate, std::max(first, last));
     ASSERT_NEAR(std::log(rate), (1.0 - progress) * std::log(first) + progress * std::log(last),
@@ -99,6 +98,7 @@ TEST(QLearning, EpsilonReachesItsFinalValueAfterTheExplorationFraction) {
     agent.set_progress(progress);
     EXPECT_EQ(agent.epsilon(), 0.125);
   }
+  // Half of the exploration fraction of an exponential schedule: the geometric mean.
   QLearningConfig exponential = config;
   exponential.schedule = Schedule::exponential;
   EXPECT_DOUBLE_EQ(epsilon_at(exponential, 0.125), std::sqrt(0.5 * 0.125));

@@ -54,7 +54,8 @@ TEST(QLearning, PendingStepsOfRemovedEnvironmentsAreLearned) {
   EXPECT_EQ(agent.network().value(cell(2), 1), 4.0);
 }
 
-// Weights, random numbers and other tensors without a copy for each environment are shared.
+// Other environments do nothing here. Weights, random numbers and other tensors without a copy for
+// each environment are shared.
 TEST(QLearning, EachOfSeveralEnvironmentsLearnsLikeASingleOne) {
   auto alone = vector_agent();
   testing::World<decltype(alone)> world(2, 9);
@@ -65,13 +66,13 @@ TEST(QLearning, EachOfSeveralEnvironmentsLearnsLikeASingleOne) {
     testing::World<decltype(alone)> same_world(2, 9, environment);
     for (int t = 0; t < 300; ++t) same_world.step(one_of_four);
     const core::State state = core::state_of(one_of_four);
-    const std::string before =
+    const std::string prefix =
         environment == 0 ? "" : "environment." + std::to_string(environment) + ".";
     for (const auto& [name, tensor] : core::state_of(alone)) {
       const bool is_shared = !state.contains("environment.1." + name);
-      EXPECT_EQ(state.at(is_shared ? name : before + name), tensor) << name;
+      EXPECT_EQ(state.at(is_shared ? name : prefix + name), tensor) << name;
     }
-    EXPECT_NE(state.at(before + "n_step_buffer.next_state"),
+    EXPECT_NE(state.at(prefix + "n_step_buffer.next_state"),
               state.at("environment.1.n_step_buffer.next_state"));
   }
 }
@@ -79,15 +80,15 @@ TEST(QLearning, EachOfSeveralEnvironmentsLearnsLikeASingleOne) {
 TEST(QLearning, RefusesInconsistentStatesOfEnvironments) {
   auto agent = sdnn_agent();
   agent.set_n_environments(3);
-  const std::vector<double> place = {0.5, 0.5};
-  for (int t = 0; t < 20; ++t) (void)agent.act(place);  // until no random start step is left
-  agent.learn(place, 0, 1.0, place, false, 2);
+  const std::vector<double> state = {0.5, 0.5};
+  for (int t = 0; t < 20; ++t) (void)agent.act(state);  // until no random start step is left
+  agent.learn(state, 0, 1.0, state, false, 2);
   testing::expect_that_damage_is_refused(agent);
   const core::State good = core::state_of(agent);
   const auto refused = [&](const core::State& bad, const std::string& message) {
     testing::expect_refused(agent, bad, "state: environment.2." + message);
   };
-  refused(testing::with_number(good, "environment.2.kept_action", std::int64_t{7}),
+  refused(testing::with_number(good, "environment.2.kept_action", std::int64_t{7}),  // of 7
           "kept_action must be an action");
   core::State bad = good;  // a second one is missing
   std::erase_if(bad, [](const auto& item) { return item.first.starts_with("environment.1."); });
@@ -99,11 +100,13 @@ TEST(QLearning, ARestoredAgentAllocatesNothing) {
   testing::expect_that_a_restored_agent_allocates_nothing(rbf_agent, testing::allocation_count);
 }
 
+// The agent has 7 actions, 20 start steps, 4-step returns and actions of up to 5 steps.
 TEST(QLearning, RefusesInconsistentStates) {
   auto agent = sdnn_agent();
   testing::World<OneDimension<QLearning<SDNNC>>> world(2, 7);
-  const core::State young = core::state_of(agent);
+  const core::State at_the_start = core::state_of(agent);
   while (core::state_of(agent).contains("n_random_left")) world.step(agent);
+  // Until an action is repeated while two steps are pending.
   while (testing::number_of<std::int32_t>(core::state_of(agent), "n_kept") == 0 ||
          core::state_of(agent).at("n_step_buffer.rewards").size() < 2) {
     world.step(agent);
@@ -119,7 +122,8 @@ TEST(QLearning, RefusesInconsistentStates) {
   refused(with_number(good, "n_step_buffer.actions", std::int64_t{7}, 1),
           "n_step_buffer.actions must be of actions");
   refused(with_number(good, "kept_action", std::int64_t{7}), "kept_action must be an action");
-  refused(with_number(young, "n_random_left", 21), "n_random_left must be in [0, start_steps]");
+  refused(with_number(at_the_start, "n_random_left", 21),
+          "n_random_left must be in [0, start_steps]");
   refused(with_number(good, "n_kept", 5), "n_kept must be in [0, max_action_repeat)");
   refused(with_number(good, "progress", 1.1), "progress must be in [0, 1]");
   core::State bad = good;

@@ -193,8 +193,8 @@ TEST(QLearning, StartStepsAreRandomAndLaterOnesGreedy) {
       n_repeated += action == last;
       last = action;
     }
-    EXPECT_EQ(n_repeated > 5, longest > 1);
-    agent.begin_episode();  // ends the repetition of an action
+    EXPECT_EQ(n_repeated > 5, longest > 1);  // of 2^17 actions, only repeated ones are equal
+    agent.begin_episode();                   // ends the repetition of an action
     for (int i = 0; i < 20; ++i) EXPECT_EQ(agent.act(cell(0)), 5U);
   }
 }
@@ -231,7 +231,7 @@ TEST(QLearning, AnAdaptiveRangeOfValuesFollowsTheRewards) {
   EXPECT_EQ(scale().q_low(), 0.0);
   EXPECT_EQ(scale().q_high(), 10.0);
   for (int t = 0; t < 40; ++t) agent.learn(state, 0, -20.0, state, true);
-  EXPECT_EQ(scale().q_low(), -22.5);
+  EXPECT_EQ(scale().q_low(), -16.0 - (10.0 + 16.0) / 4);  // for the first sum, -20 + 8 / 2 = -16
   for (int t = 0; t < 400; ++t) agent.learn(state, 0, 1.0, state, t % 2 == 1);
   // Episodes of two steps with returns of 1 + 1/2 and 1.
   EXPECT_EQ(scale().q_low(), 0.0);
@@ -242,6 +242,8 @@ TEST(QLearning, AnAdaptiveRangeOfValuesFollowsTheRewards) {
   EXPECT_EQ(with_fixed_range.network().output_scale().q_high(), network().q_high);
 }
 
+// With averaged weights, greedy actions are those of the highest averaged values, and exploring
+// ones those of the present values, which differ now and then.
 TEST(QLearning, GreedyActionsFollowAveragedValues) {
   approximators::SDNNCConfig config = network();
   config.averaging_interval = 5;
@@ -301,8 +303,7 @@ TEST(QLearning, RefusesNetworksOfDifferentInputs) {
 template <class Check>
 void learn_at_random(OneDimension<QLearning<SDNNC>>& agent, const Check& check) {
   core::Random random(4, core::Stream::exploration);
-  std::vector<double> state(2);
-  std::vector<double> next(2);
+  std::vector<double> state(2), next(2);
   for (int step = 0; step < 300; ++step) {
     for (double& x : next) x = random.uniform();
     agent.learn(state, agent.act(state), random.uniform() - 0.4, next, step % 20 == 19);
@@ -323,8 +324,7 @@ TEST(QLearning, TheBestActionByCountsIsTheBestByValues) {
         ASSERT_TRUE(agent.network().values_rise());
         auto workspace = agent.workspace();
         const EpsilonGreedy by_values(policy, 1);
-        core::Random ties(9, core::Stream::ties);
-        core::Random same_ties = ties;
+        core::Random ties(9, core::Stream::ties), same_ties = ties;
         learn_at_random(agent, [&](const std::vector<double>& state) {
           const std::size_t action = agent.best_action(state, workspace, ties);
           ASSERT_EQ(action, by_values.best_action(agent.values(state, workspace), same_ties));

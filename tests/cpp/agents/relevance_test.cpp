@@ -70,7 +70,7 @@ TEST(Relevance, KeepsInputsThatActionsOrRewardsDependOn) {
       }
     }
   }
-  EXPECT_LE(n_noise_kept, 16);  // of 320
+  EXPECT_LE(n_noise_kept, 0.05 * 10 * 2 * 2 * 8);  // 5 % of all noise inputs
 }
 
 TEST(Relevance, KeepsAllInputsWithoutRelevanceOrWithFewTransitions) {
@@ -92,6 +92,7 @@ TEST(Relevance, KeepsListedInputsAndThoseThatPredictThem) {
             (std::vector<bool>{true, true, false, false, false}));
 }
 
+// A reward if inputs 1 and 4 are both below or both above 1/2: neither tells anything alone.
 TEST(Relevance, FindsInputsThatMatterOnlyTogether) {
   int n_noise_kept = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
@@ -109,7 +110,7 @@ TEST(Relevance, FindsInputsThatMatterOnlyTogether) {
     EXPECT_TRUE(kept[1] && kept[4]) << seed;
     n_noise_kept += static_cast<int>(std::ranges::count(kept, true)) - 2;
   }
-  EXPECT_LE(n_noise_kept, 2);  // of 40
+  EXPECT_LE(n_noise_kept, 0.05 * 10 * 4);  // 5 % of all other inputs
 }
 
 TEST(Relevance, KeepsHardlyAnyOfManyNoiseInputs) {
@@ -211,7 +212,7 @@ TEST(Relevance, JudgesTwoBinaryInputsSeparately) {
     EXPECT_TRUE(kept[0] && kept[2]) << seed;
     n_kept_by_chance += kept[1] ? 1 : 0;
   }
-  EXPECT_LE(n_kept_by_chance, 3);
+  EXPECT_LE(n_kept_by_chance, 3);  // of 10
 }
 
 TEST(BinaryGroups, ActionsSteerWhatTheyDecide) {

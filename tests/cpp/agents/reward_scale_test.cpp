@@ -65,11 +65,11 @@ TEST(QLambda, RefineUnitMakesSmallerRewardsLearnable) {
   EXPECT_GT(value(0), 0x1p50);
   agent.learn(state, std::array{std::size_t{1}}, 1.0, state, true);
   EXPECT_EQ(value(1), 0.0);
-  agent.refine_unit(0, 0);
+  agent.refine_unit(/*size_in_window=*/0, /*size=*/0);  // rewards of about 2^0
   EXPECT_LT(value(0), 0x1p20);
   agent.learn(state, std::array{std::size_t{1}}, 1.0, state, true);
   EXPECT_GT(value(1), 0.1);
-  const auto exponent = agent.readout().exponent();
+  const auto exponent = agent.readout().exponent();  // of the unit, which is small enough now
   agent.refine_unit(0, 0);
   EXPECT_EQ(agent.readout().exponent(), exponent);
 }

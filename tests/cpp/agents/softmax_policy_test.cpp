@@ -26,6 +26,7 @@ std::vector<SoftmaxTerm> softmax_of(const std::vector<double>& preferences,
   return terms;
 }
 
+// Probabilities and slopes are integers in units of 1 / 65536.
 TEST(Softmax, EqualsItsFormulaInFloatingPoint) {
   core::Random random(1, core::Stream::weights);
   for (int trial = 0; trial < 200; ++trial) {
@@ -35,9 +36,9 @@ TEST(Softmax, EqualsItsFormulaInFloatingPoint) {
     for (const double h : preferences) p.push_back(std::exp(h));
     const double sum = std::accumulate(p.begin(), p.end(), 0.0);
     double entropy = 0.0;
-    for (double& part : p) {
-      part /= sum;
-      entropy -= part * std::log(part);
+    for (double& probability : p) {
+      probability /= sum;
+      entropy -= probability * std::log(probability);
     }
     const auto terms = softmax_of(preferences);
     for (std::size_t a = 0; a < p.size(); ++a) {
@@ -49,8 +50,8 @@ TEST(Softmax, EqualsItsFormulaInFloatingPoint) {
 
 TEST(Softmax, EqualPreferencesAreExactlyEven) {
   for (const SoftmaxTerm& term : softmax_of({3.0, 3.0, 3.0, 3.0})) {
-    EXPECT_EQ(term.weight, 1U << 30);
-    EXPECT_EQ(term.probability, 1 << 14);
+    EXPECT_EQ(term.weight, 1U << 30);        // exp(0), in units of 2^-30
+    EXPECT_EQ(term.probability, 65536 / 4);  // in units of 2^-16
     EXPECT_EQ(term.entropy_slope, 0);
   }
 }
@@ -60,14 +61,14 @@ TEST(Softmax, AMaskedActionHasProbabilityZero) {
   const auto terms = softmax_of({9.0, 1.0, 1.0}, allowed);
   EXPECT_EQ(terms[0].weight, 0U);
   EXPECT_EQ(terms[0].entropy_slope, 0);
-  EXPECT_EQ(terms[1].probability, 1 << 15);
+  EXPECT_EQ(terms[1].probability, 65536 / 2);
   core::Random random(1, core::Stream::exploration);
   for (int i = 0; i < 50; ++i) EXPECT_NE(draw_term(terms, random), 0U);
 }
 
 TEST(Softmax, PreferencesFarBelowTheBestAreNeverDrawn) {
   const auto terms = softmax_of({0.0, -60.0, 1e5});
-  EXPECT_EQ(terms[2].probability, 1 << 16);
+  EXPECT_EQ(terms[2].probability, 65536);
   EXPECT_EQ(terms[0].weight + terms[1].weight, 0U);
 }
 
@@ -101,8 +102,9 @@ TEST(SoftmaxPolicy, TheMeanOfAnActionAndItsNeighboursIsWeightedByProbabilities) 
   auto workspace = policy.workspace();
   const std::uint32_t weights[] = {1, 4, 3, 2, 1};
   for (std::size_t row = 0; row < 5; ++row) workspace.terms[row].weight = weights[row];
-  EXPECT_EQ(policy.mean_offset(workspace, 0, 1), 0.25);               // (3 - 1) / (1 + 4 + 3)
-  EXPECT_EQ(policy.mean_offset(workspace, 1, 0), 21845.0 / 65536.0);  // 1 / (2 + 1), below the end
+  EXPECT_EQ(policy.mean_offset(workspace, 0, 1), 0.25);  // (3 - 1) / (1 + 4 + 3)
+  // 1 / (2 + 1) in units of 1 / 65536, rounded down; the first action has one neighbour only.
+  EXPECT_EQ(policy.mean_offset(workspace, 1, 0), 65535.0 / 3 / 65536.0);
 }
 
 }  // namespace

@@ -22,6 +22,11 @@ void draw(core::Pcg64& random, Numbers& action) {
   for (double& x : action) x = random.below(5);
 }
 
+/// A warm-up of `n_steps` transitions with actions of one dimension.
+WarmUp warm_up_of(std::size_t n_variables, std::size_t n_steps, bool learns_any_transition = true) {
+  return {n_variables, /*n_dimensions=*/1, n_steps, /*seed=*/3, learns_any_transition};
+}
+
 bool always(const Numbers&) { return true; }
 
 void learn(WarmUp& warm_up, std::size_t environment, const Numbers& action) {
@@ -33,10 +38,8 @@ void step(WarmUp& warm_up, std::size_t environment = 0) {
   learn(warm_up, environment, warm_up.act(draw, always, true, environment));
 }
 
-// Warm-ups of two variables and one dimension of actions: {2, 1, n_steps, seed,
-// learns_any_transition}.
 TEST(WarmUp, TakesEveryActionAndRepeatsItForSomeSteps) {
-  WarmUp warm_up(2, 1, 1000, 3, true);
+  WarmUp warm_up = warm_up_of(2, 1000);
   std::set<double> actions;
   int n_changes = 0;
   double last = -1.0;
@@ -47,12 +50,12 @@ TEST(WarmUp, TakesEveryActionAndRepeatsItForSomeSteps) {
     last = action;
   }
   EXPECT_EQ(actions.size(), 5U);
-  EXPECT_LT(n_changes, 200);
+  EXPECT_LT(n_changes, 200);  // most of the 400 steps repeat an action
   EXPECT_GT(n_changes, 20);
 }
 
 TEST(WarmUp, DoesNotRepeatAMaskedAction) {
-  WarmUp warm_up(2, 1, 1000, 3, true);
+  WarmUp warm_up = warm_up_of(2, 1000);
   double forbidden = -1.0;
   const auto draw_other = [&](core::Pcg64& random, Numbers& action) {
     do draw(random, action);
@@ -66,14 +69,15 @@ TEST(WarmUp, DoesNotRepeatAMaskedAction) {
   }
 }
 
+// A mask for three actions in the second transition; the others allow all actions.
 TEST(WarmUp, RemembersMasks) {
-  WarmUp warm_up(1, 1, 1000, 3, true);
-  const Numbers here{0.5}, action{1.0};
+  WarmUp warm_up = warm_up_of(1, 1000);
+  const Numbers state{0.5}, action{1.0};
   const std::vector<std::uint8_t> mask{0, 1, 1};
-  warm_up.learn({false, 0, here, action, 1.0, here, false});
+  warm_up.learn({false, 0, state, action, 1.0, state, false});
   EXPECT_TRUE(warm_up.step(0).next_mask.empty());
-  warm_up.learn({false, 0, here, action, 1.0, here, false, mask});
-  warm_up.learn({false, 0, here, action, 1.0, here, false});
+  warm_up.learn({false, 0, state, action, 1.0, state, false, mask});
+  warm_up.learn({false, 0, state, action, 1.0, state, false});
   const std::vector<std::vector<std::uint8_t>> expected{{1, 1, 1}, mask, {1, 1, 1}};
   for (std::size_t t = 0; t < 3; ++t) {
     EXPECT_TRUE(std::ranges::equal(warm_up.step(t).next_mask, expected[t])) << t;
@@ -81,21 +85,20 @@ TEST(WarmUp, RemembersMasks) {
 }
 
 TEST(WarmUp, RemembersDurationsFromTheFirstThatIsNotOneAndRestoresThem) {
-  WarmUp warm_up(1, 1, 1000, 3, true);
-  const Numbers here{0.5}, action{1.0};
-  const Numbers dts{1.0, 1.0, 2.5, 1.0};
+  WarmUp warm_up = warm_up_of(1, 1000);
+  const Numbers state{0.5}, action{1.0}, dts{1.0, 1.0, 2.5, 1.0};
   for (std::size_t t = 0; t < dts.size(); ++t) {
     EXPECT_EQ(core::state_of(warm_up).contains("dts"), t > 2);
     warm_up.learn({.begins = false,
                    .environment = 0,
-                   .observation = here,
+                   .observation = state,
                    .action = action,
                    .reward = 1.0,
-                   .next_observation = here,
+                   .next_observation = state,
                    .terminated = false,
                    .dt = dts[t]});
   }
-  WarmUp restored(1, 1, 1000, 3, true);
+  WarmUp restored = warm_up_of(1, 1000);
   core::restore(restored, core::state_of(warm_up));
   for (std::size_t t = 0; t < dts.size(); ++t) {
     EXPECT_EQ(warm_up.step(t).dt, dts[t]);
@@ -106,7 +109,7 @@ TEST(WarmUp, RemembersDurationsFromTheFirstThatIsNotOneAndRestoresThem) {
 }
 
 TEST(WarmUp, EvaluationDoesNotChangeItsActions) {
-  WarmUp evaluated(2, 1, 100, 3, true), warm_up = evaluated;
+  WarmUp evaluated = warm_up_of(2, 100), warm_up = evaluated;
   for (int t = 0; t < 50; ++t) {
     (void)evaluated.act(draw, always, false, 0);
     EXPECT_EQ(evaluated.act(draw, always, true, 0), warm_up.act(draw, always, true, 0));
@@ -114,7 +117,7 @@ TEST(WarmUp, EvaluationDoesNotChangeItsActions) {
 }
 
 TEST(WarmUp, RemembersTransitionsInOrder) {
-  WarmUp warm_up(2, 1, 3, 3, true);
+  WarmUp warm_up = warm_up_of(2, 3);
   warm_up.set_n_environments(2);
   learn(warm_up, 1, {2.0});
   learn(warm_up, 0, {3.0});
@@ -135,7 +138,7 @@ TEST(WarmUp, RemembersTransitionsInOrder) {
 }
 
 TEST(WarmUp, WaitsForPendingActionsIfOnlyTheAgentsActionsAreLearned) {
-  WarmUp warm_up(2, 1, 2, 3, false);
+  WarmUp warm_up = warm_up_of(2, 2, /*learns_any_transition=*/false);
   warm_up.set_n_environments(2);
   step(warm_up, 0);
   const Numbers pending = warm_up.act(draw, always, true, 1);

@@ -64,8 +64,7 @@ template <ActionValue Q>
 void expect_a_model(Q model) {
   testing::WithWorkspace<Q> q(std::move(model));
   const std::array<double, 2> state = {0.2, 0.9};
-  std::vector<double> row(q.n_actions());
-  std::vector<double> again(q.n_actions());
+  std::vector<double> row(q.n_actions()), again(q.n_actions());
   for (int i = 0; i < 60; ++i) {
     q.update(state, 1, 3.0, 0.5);
     q.values(state, row);

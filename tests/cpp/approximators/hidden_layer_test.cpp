@@ -13,8 +13,7 @@ namespace {
 
 /// Columns of an input, by sign.
 struct Input {
-  std::vector<std::uint32_t> plus;
-  std::vector<std::uint32_t> minus;
+  std::vector<std::uint32_t> plus, minus;
 
   operator coding::SignedColumns() const { return {plus, minus}; }
 };
@@ -143,8 +142,7 @@ TEST(HiddenLayer, CorrectionsThatCancelStayInAByte) {
 // The first ten columns are double: corrections count twice there.
 TEST(HiddenLayer, CorrectionsEqualPlainOnesAtAnySizeOfWeights) {
   constexpr std::size_t kUnits = 130;
-  constexpr std::uint32_t kColumns = 40;
-  constexpr std::uint32_t kDouble = 10;
+  constexpr std::uint32_t kColumns = 40, kDouble = 10;
   HiddenLayer p(kUnits, kColumns, kDouble);
   std::vector<std::array<std::int32_t, kColumns>> weights(kUnits);
   std::vector<std::int32_t> expected(kUnits);
@@ -214,8 +212,7 @@ TEST(HiddenLayer, ManyColumnsLowerTheWeightLimitSoThatPotentialsFit) {
 }
 
 TEST(HiddenLayer, AddingToAColumnEqualsSettingItsWeights) {
-  HiddenLayer added(130, 3);
-  HiddenLayer set(130, 3);
+  HiddenLayer added(130, 3), set(130, 3);
   core::Random random(5, core::Stream::weights);
   std::vector<std::int32_t> changes(130);
   for (int round = 0; round < 40; ++round) {
@@ -230,8 +227,7 @@ TEST(HiddenLayer, AddingToAColumnEqualsSettingItsWeights) {
     }
   }
   const Input x{.plus = {0, 2}, .minus = {1}};
-  std::vector<std::int32_t> of_added(130);
-  std::vector<std::int32_t> of_set(130);
+  std::vector<std::int32_t> of_added(130), of_set(130);
   added.potentials(x, of_added);
   set.potentials(x, of_set);
   EXPECT_EQ(of_added, of_set);

@@ -62,7 +62,7 @@ TEST(LinearSDNN, KeepsItsValuesWhenInputsAreAdded) {
     core::Random random(7, core::Stream::weights);
     LinearSDNN readout(small_readout(n_first), kThreeAndTwo, 5);
     const auto first = static_cast<std::size_t>(n_first);
-    for (int n = n_first + 1; n <= n_first + 4; n += 1 + n % 2) {
+    for (int n = n_first + 1; n <= n_first + 4; n += 1 + n % 2) {  // one or two inputs more
       learn_at_random(readout, 30, random);
       LinearSDNN extended(small_readout(n), kThreeAndTwo, 5, first);
       extended.continue_from(readout);
@@ -104,6 +104,7 @@ TEST(LinearSDNN, HasAtLeast64PatternUnitsWithManyInputs) {
   }
 }
 
+// Negative counts, and counts that further steps would overflow.
 TEST(LinearSDNN, RefusesStatesWithImpossibleCounts) {
   core::Random random(7, core::Stream::weights);
   LinearSDNN readout(small_readout(2), kThreeAndTwo, 5);

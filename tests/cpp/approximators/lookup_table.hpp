@@ -65,9 +65,7 @@ class LookupTable {
     return cell * n_actions_;
   }
 
-  std::size_t n_inputs_;
-  std::size_t n_cells_;
-  std::size_t n_actions_;
+  std::size_t n_inputs_, n_cells_, n_actions_;
   std::vector<double> table_;
 };
 

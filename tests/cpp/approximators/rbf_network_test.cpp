@@ -115,7 +115,8 @@ TEST(RBFNetwork, ValuesAreSumsInTheOrderOfTheBases) {
   }
 }
 
-// The bits are the same with every compiler, optimization level and instruction set.
+// The digests were recorded once; the bits are the same with every compiler, optimization level and
+// instruction set.
 TEST(RBFNetwork, KeepsItsBits) {
   const auto digest_of = [](const RBFNetworkConfig& config) {
     UsedRBF network = taught(config, 200);
@@ -166,8 +167,7 @@ TEST(RBFNetwork, RefusesTooManyBasesBeforeItAllocatesMemory) {
 TEST(RBFNetwork, RefusesBadArgumentsAndChangesNothing) {
   UsedRBF network = taught({.n_inputs = 2, .n_actions = 3}, 10);
   const std::vector<double> weights(network.weights().begin(), network.weights().end());
-  const std::vector<double> good = {0.1, 0.2};
-  const std::vector<double> big = {0.1, 1.2};
+  const std::vector<double> good = {0.1, 0.2}, big = {0.1, 1.2};
   std::vector<double> out(3), short_out(2);
   EXPECT_THROW(network.set_weights(std::vector<double>(63)), std::invalid_argument);
   EXPECT_THROW(network.values(big, out), std::invalid_argument);

@@ -29,6 +29,7 @@ TEST(SDNNC, QIsExactlyZeroEverywhereAtTheStart) {
   }
 }
 
+// A lattice of 8 stores parameters in eighths: thresholds of -10 and 10, weights up to 1/2.
 TEST(SDNNC, UniformInitialWeightsStayWithinTheirLimitOnTheLattice) {
   SDNNCConfig config = small();
   config.lattice = 8;
@@ -68,8 +69,7 @@ TEST(SDNNC, RoundingDecidesOnFractionsOfAUnit) {
   EXPECT_EQ(moved(Rounding::away, -0.25, 5), -1);
   EXPECT_EQ(moved(Rounding::away, 2.0, 5), 2);
   EXPECT_EQ(moved(Rounding::away, 0.0, 5), 0);
-  int up = 0;
-  int down = 0;
+  int up = 0, down = 0;
   constexpr int kNetworks = 400;
   for (std::uint64_t seed = 0; seed < kNetworks; ++seed) {
     const int rise = moved(Rounding::random, 0.25, seed);
@@ -82,7 +82,7 @@ TEST(SDNNC, RoundingDecidesOnFractionsOfAUnit) {
   EXPECT_NEAR(down, 1.75 * kNetworks, 5 * sigma);
 }
 
-// Weights that need two bytes take another way; it must not allocate on its first use either.
+// Weights of two bytes have separate storage and sums, which must not allocate on first use either.
 TEST(SDNNC, LargeWeightsAllocateNothing) {
   SDNNCConfig config = small();
   config.lattice = 64;
@@ -132,6 +132,7 @@ TEST(SDNNC, RefusesParametersOfWrongValueOrNumberAndKeepsItsOwn) {
   EXPECT_THROW(network.set_parameters(weights, thresholds), std::invalid_argument);
 }
 
+// warm_caches touches all memory before the first step, and counts no pass over the weights.
 TEST(SDNNC, WarmCachesChangeNothing) {
   Network cold(small(), 5);
   Network warm = cold;
@@ -145,11 +146,12 @@ TEST(SDNNC, WarmCachesChangeNothing) {
 
 TEST(SDNNC, TheEndsOfTheUnitIntervalAreStates) {
   Network network(small(), 1);
-  EXPECT_EQ(values(network, {0.0, 0.0, 0.0}).size(), 141U);
+  EXPECT_EQ(values(network, {0.0, 0.0, 0.0}).size(), 200U - 60 + 1);  // windows of 60 units
   EXPECT_EQ(values(network, {1.0, 1.0, 1.0}), values(network, {0.9999, 0.9999, 0.9999}));
   EXPECT_EQ(values(network, {-0.0, 0.0, 0.0}), values(network, {0.0, 0.0, 0.0}));
 }
 
+// The network has three inputs in [0, 1] and 141 actions.
 TEST(SDNNC, ABadArgumentChangesNothing) {
   Network network(small(), 1);
   const Network before = network;
@@ -172,7 +174,8 @@ TEST(SDNNC, ABadArgumentChangesNothing) {
   EXPECT_EQ(values(network, good), values_by_masks(network, good));
 }
 
-TEST(SDNNC, AnotherRangeMovesValuesButNotTheirPlaceInIt) {
+// A value keeps its share of the way from the low to the high end of the range.
+TEST(SDNNC, AnotherRangeScalesTheValues) {
   Network network(small(), 1);
   core::Random random(6, core::Stream::ties);
   const State state = random_state(3, random);
@@ -233,6 +236,8 @@ TEST(SDNNC, RefusesAStateThatDoesNotFit) {
   testing::expect_that_damage_is_refused(network);
   const core::State good = core::state_of(network);
   EXPECT_EQ(good.at("weights").shape, (std::vector<std::size_t>{12, 2 * 8}));  // units, columns
+  // Weights beyond their limit of 16383, thresholds of 2^30 in size, and an empty or infinite
+  // range.
   const auto refused = [&](const core::State& bad, const std::string& message) {
     testing::expect_refused(network, bad, "state: " + message);
   };

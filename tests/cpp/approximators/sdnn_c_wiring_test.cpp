@@ -33,8 +33,7 @@ TEST(SDNNC, PairsOfInputsAreAnEvenShareOfAll) {
     SDNNCConfig config = sizes;
     config.max_pairs = max_pairs;
     const Network network(config, 3);
-    std::vector<std::size_t> n_modifiers(7, 0);
-    std::vector<std::size_t> n_modified(7, 0);
+    std::vector<std::size_t> n_modifiers(7, 0), n_modified(7, 0);
     for (const coding::InputPair& pair : network.state_code().groups()) {
       ++n_modifiers[pair.modified];
       ++n_modified[pair.modifier];
@@ -97,7 +96,7 @@ TEST(SDNNC, TooLargeANetworkIsRefusedBeforeMemoryIsAllocated) {
                           .n_active_units = 20,
                           .max_table_bytes = 1 << 20};
   EXPECT_EQ(refusal(small), "no error");
-  SDNNCConfig smaller = small;
+  SDNNCConfig smaller = small;  // the same network, with less memory than it needs
   smaller.max_table_bytes = 1 << 16;
   EXPECT_NE(refusal(smaller), "no error");
 }

@@ -20,8 +20,7 @@ TEST(AnchorPatterns, AnchorsHaveHalfOfTheirUnitsOn) {
 }
 
 TEST(AnchorPatterns, UnbalancedAnchorsHaveIndependentUnits) {
-  core::Random random(6, core::Stream::code_books);
-  core::Random same = random;
+  core::Random random(6, core::Stream::code_books), same = random;
   const PatternTable table = anchor_patterns(
       {.n_units = 70, .n_anchor_patterns = 2, .n_interpolated = 0, .balanced = false}, random);
   for (std::size_t k = 0; k < 70; ++k) EXPECT_EQ(table[0][k], same.below(2) == 1);
@@ -38,8 +37,7 @@ TEST(AnchorPatterns, NeighboursDifferByEqualPortionsOfUnits) {
   for (const bool circular : {false, true}) {
     const PatternTable table = paper_table(3, {.n_units = 200, .circular = circular});
     for (std::size_t first = 0; first < (circular ? 360U : 315U); first += 45) {
-      const std::size_t last = (first + 45) % 360;
-      const std::size_t differing = table[first].distance(table[last]);
+      const std::size_t last = (first + 45) % 360, differing = table[first].distance(table[last]);
       for (std::size_t j = 0; j < 45; ++j) {
         const std::size_t here = first + j, n_flipped = j * differing / 45;
         const std::size_t n_flipped_next = (j + 1) * differing / 45;

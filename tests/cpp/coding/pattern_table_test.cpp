@@ -22,6 +22,7 @@ TEST(PatternTable, KeepsSignsBitByBit) {
   EXPECT_EQ(table.sign(1, 2), 1);
 }
 
+// Patterns of 65 units take two words of 64; new patterns are -1 everywhere.
 TEST(PatternTable, StartsEveryPatternAtAWord) {
   PatternTable table(3, 65);
   EXPECT_EQ(table.n_words(), 2U);

@@ -12,8 +12,7 @@ PatternTable table(std::initializer_list<std::int8_t> signs) {
   return PatternTable::from_signs({signs.begin(), signs.size()}, 1, signs.size());
 }
 
-TEST(Permutation,
-     MovesUnitPermutationOfKToUnitK) {  // units 2, 0 and 1 of the pattern, in this order
+TEST(Permutation, MovesUnitPermutationOfKToUnitK) {  // units 2, 0, 1 of the pattern
   EXPECT_EQ(permuted(table({1, -1, -1}), {2, 0, 1}), table({-1, 1, -1}));
 }
 

@@ -33,8 +33,7 @@ TEST(SelectiveDesensitization, KeepsThePatternWhereTheModifierIsOn) {
   EXPECT_EQ(code.n_words(), 2U);
   EXPECT_EQ(code.max_active(), 2U + 2U);  // each modifier's patterns have two units on
   EXPECT_EQ(code.slot_of(5), 64U + 1U);   // unit 1 of the second pair, which begins on a word
-  std::array<std::uint64_t, 2> active{};
-  std::array<std::uint64_t, 2> positive{};
+  std::array<std::uint64_t, 2> active{}, positive{};
   const std::array<std::int32_t, 2> bins{0, 1};
   code.encode(bins, active.data(), positive.data());
   EXPECT_EQ(active[0], 0b0110U);    // modifier pattern -1 +1 +1 -1
@@ -45,14 +44,13 @@ TEST(SelectiveDesensitization, KeepsThePatternWhereTheModifierIsOn) {
 
 TEST(SelectiveDesensitization, AcceptsASingleInput) {
   const SelectiveDesensitization code({table({1, -1}, 1)}, {table({1, 1}, 1)}, {{0, 0}});
-  std::uint64_t active = 0;
-  std::uint64_t positive = 0;
+  std::uint64_t active = 0, positive = 0;
   code.encode(std::array<std::int32_t, 1>{0}, &active, &positive);
   EXPECT_EQ(active, 3U);
   EXPECT_EQ(positive, 1U);
 }
 
-// Inner products from the tables equal those of the codes, with shared and with separate gates.
+// Inner products from the tables equal those of the codes, with shared and with separate modifiers.
 TEST(SelectiveDesensitization, InnerProductsOfBinsEqualThoseOfCodes) {
   core::Random random(4, core::Stream::code_books);
   for (const std::size_t n_units : {5U, 64U, 200U, 300U}) {
@@ -61,9 +59,9 @@ TEST(SelectiveDesensitization, InnerProductsOfBinsEqualThoseOfCodes) {
       for (std::size_t bin = 0; bin < 7; ++bin) coding::fill_random(drawn, bin, false, random);
       return std::make_shared<const PatternTable>(std::move(drawn));
     };
-    const auto gate = draw();
+    const auto shared = draw();
     const SelectiveDesensitization code({draw(), draw(), draw(), draw()},
-                                        {gate, gate, draw(), gate},
+                                        {shared, shared, draw(), shared},
                                         {{0, 1}, {2, 1}, {1, 0}, {0, 1}});
     for (int trial = 0; trial < 20; ++trial) {
       std::array<coding::Bin, 3> a{};

@@ -118,8 +118,7 @@ TEST_P(StateCodeOfInputs, EqualsTheEquationOfLayer3) {
 // A pair of columns is stored as half its sum and half its difference. Where both are active, one
 // of the two is 0.
 TEST_P(StateCodeOfInputs, ThePairedCodeHasHalfAsManyActiveColumns) {
-  const std::size_t l = GetParam().l;
-  const std::size_t k = GetParam().n_partners();
+  const std::size_t l = GetParam().l, k = GetParam().n_partners();
   const auto code = GetParam().code(37, 5);
   EXPECT_EQ(code.n_double_columns(), 37U * l * (k - k % 2));
   std::vector<Bin> bins = {17, 200, 359, 0, 90, 123};
@@ -127,8 +126,7 @@ TEST_P(StateCodeOfInputs, ThePairedCodeHasHalfAsManyActiveColumns) {
   const auto x = x_sd(code, bins);
   const Paired paired_code(code, bins);
   const SignedColumns columns = paired_code.lists.columns();
-  std::size_t n_active = 0;
-  std::size_t n_listed = 0;
+  std::size_t n_active = 0, n_listed = 0;
   for (std::size_t j = 0; j < x.size(); ++j) {
     if (x[j] != 0) n_active += code.columns_of(j).paired ? 1 : 2;
   }
@@ -157,14 +155,14 @@ TEST_P(StateCodeOfInputs, EveryColumnOfThePairedCodeStandsForOneOrTwoUnits) {
   EXPECT_THROW(static_cast<void>(code.columns_of(code.n_columns())), std::invalid_argument);
 }
 
+// Columns whose entries change are listed, so that sums over columns can follow a change of state.
 TEST_P(StateCodeOfInputs, ChangesOfColumnsEqualTheDifferenceOfCodes) {
   const std::size_t l = GetParam().l;
   const auto code = GetParam().code(50, 6);
   core::Random random(2, core::Stream::ties);
   ColumnLists changes = code.column_lists();
   for (int trial = 0; trial < 100; ++trial) {
-    std::vector<Bin> from(l);
-    std::vector<Bin> to(l);
+    std::vector<Bin> from(l), to(l);
     for (auto& bin : from) bin = static_cast<Bin>(random.below(360));
     for (auto& bin : to) bin = static_cast<Bin>(random.below(360));
     changes.read_changes(Paired(code, from).view(), Paired(code, to).view());
@@ -180,8 +178,7 @@ TEST_P(StateCodeOfInputs, InnerProductsOfBinsEqualThoseOfDenseCodes) {
   const auto code = GetParam().code(50, 6);
   core::Random random(1, core::Stream::ties);
   for (int trial = 0; trial < 200; ++trial) {
-    std::vector<Bin> a(l);
-    std::vector<Bin> b(l);
+    std::vector<Bin> a(l), b(l);
     for (auto& bin : a) bin = static_cast<Bin>(random.below(360));
     for (auto& bin : b) bin = static_cast<Bin>(random.below(360));
     const auto x = x_sd(code, a);
@@ -201,6 +198,8 @@ TEST(StateCode, AnAnchorStateHasHalfOfItsColumnsActive) {
   EXPECT_EQ(code.inner_product(anchors, anchors), 4 * 3 * (64 / 2));
 }
 
+// Two inputs have two ordered pairs, each with a permutation of the 3 pattern units. Three inputs
+// have three of them per stride, which is a distance between paired inputs, 1 or 2.
 TEST(StateCode, RefusesBadPermutationsAndStrides) {
   const auto code = small_code(2, 3, 9);
   const std::vector<PatternTable> tables = {code.table(0), code.table(1)};

@@ -86,6 +86,7 @@ TEST(Random, NormalConsumesOneDraw) {
   }
 }
 
+// The permutation is that of the Python transcription named above, shuffling by Fisher and Yates.
 TEST(Random, ShuffleGivesTheReferencePermutation) {
   Random random(7, Stream::permutations);
   std::array<int, 10> items{0, 1, 2, 3, 4, 5, 6, 7, 8, 9};

@@ -138,6 +138,7 @@ TEST(State, OmitsMissingOptionalMembers) {
   testing::expect_refused(restored, bad, "state: other.10.value must not be there");
 }
 
+// taking(name, restore) calls restore, and adds the tensor's name to the message of its error.
 TEST(StateReader, NamesTheTensorThatCouldNotBeRestored) {
   const State state;
   StateReader reader(state);

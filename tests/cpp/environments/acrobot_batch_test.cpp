@@ -84,6 +84,7 @@ int compare_with_single(const AcrobotConfig& config, std::size_t n, int n_steps,
   return n_episodes;
 }
 
+// Sizes are below, at and above multiples of the 2, 4 and 8 acrobots that a register holds.
 TEST(AcrobotBatch, HasTheBitsOfSingleAcrobotsOnEveryInstructionSet) {
   sdnn::testing::on_every_instruction_set([&](auto level) {
     SCOPED_TRACE(level);

@@ -36,6 +36,7 @@ TEST(AcrobotSensors, AreNormalizedAsWorkedByHand) {
   EXPECT_DOUBLE_EQ(observation[3], 0.25);
   EXPECT_DOUBLE_EQ(observation[4], 0.25);  // speeds: 2 ((3/4 - 1/2)^2 + (1/4 - 1/2)^2)
   EXPECT_DOUBLE_EQ(observation[5], 0.25);  // tip 1 m below joint 1: (2 - 0 - 1) / 4
+  // Upright at -pi, which is the lower end of the angle, and with speeds beyond both limits.
   const auto up = observe({6, 0.0}, {-kPi, 0.0, 100.0, -100.0});
   EXPECT_EQ(up, (std::vector<double>{0.0, 0.5, 1.0, 0.0, 1.0, 1.0}));
 }
@@ -58,7 +59,7 @@ TEST(AcrobotSensors, AnglesJustBelowPiAreBelowOne) {
 }
 
 TEST(UnitInterval, WrappedNumbersKeepTheirFractionAndSaturatedOnesStopAtItsEnds) {
-  EXPECT_EQ(wrap_to_unit(-1e-20), 0.0);
+  EXPECT_EQ(wrap_to_unit(-1e-20), 0.0);  // 1 - 1e-20 is rounded to 1, which is 0 on the circle
   EXPECT_EQ(wrap_to_unit(1.0), 0.0);
   EXPECT_EQ(wrap_to_unit(-0.25), 0.75);
   EXPECT_EQ(wrap_to_unit(2.5), 0.5);
@@ -77,6 +78,8 @@ TEST(AcrobotSensors, NoiseIsOneNormalNumberPerSensorInOrder) {
   }
 }
 
+// The angle is -pi, where 0 and 1 meet; the speeds are beyond both limits, at 1 and at 0. Half of
+// the noise is negative, so it wraps or is clipped in 1,000 of 2,000 observations.
 TEST(AcrobotSensors, NoiseWrapsAnglesAndClipsOtherSensors) {
   AcrobotSensors sensors({6, 0.02}, 8, Stream::sensor_noise);
   int low = 0, high = 0, floor = 0, ceiling = 0;
@@ -92,7 +95,7 @@ TEST(AcrobotSensors, NoiseWrapsAnglesAndClipsOtherSensors) {
     ceiling += observation[2] == 1.0;
     floor += observation[3] == 0.0;
   }
-  for (const int n : {low, high, ceiling, floor}) EXPECT_GT(n, 850);  // 1000 is expected
+  for (const int n : {low, high, ceiling, floor}) EXPECT_GT(n, 850);
 }
 
 TEST(AcrobotSensors, NoiseMayEnterBeforeRedundantVariablesAreComputed) {

@@ -30,7 +30,9 @@ TEST(AcrobotDynamics, KeepsItsEnergyWithoutTorque) {
   }
 }
 
-// Hanging: d11 = 4.5, d12 = 1.75, d22 = 1.25; folded up: d11 = 2.5, d12 = 0.75.
+// Masses m, lengths l and moments of inertia I are 1, the centres of mass lc at 1/2:
+// d22 = m2 lc2^2 + I2 = 1.25, d12 = d22 + m2 l1 lc2 cos(theta2) = 1.25 +- 0.5,
+// d11 = m1 lc1^2 + m2 l1^2 + I1 + d12 +- 0.5 = 2.25 + d12 +- 0.5.
 TEST(AcrobotDynamics, TheMassMatrixIsAsWorkedByHand) {
   EXPECT_EQ(Acrobot().mass_matrix(0.0), (Eigen::Matrix2d{{4.5, 1.75}, {1.75, 1.25}}));
   EXPECT_EQ(Acrobot().mass_matrix(kPi), (Eigen::Matrix2d{{2.5, 0.75}, {0.75, 1.25}}));
@@ -96,10 +98,11 @@ TEST(AcrobotDynamics, KeepsItsBits) {
   EXPECT_EQ(digest, 12301352983019598016u);
 }
 
+// A decision ends after a second; 5 degrees are 0.087 rad.
 TEST(AcrobotTask, PenalizesRestingAtTheDecisionInstant) {
   AcrobotConfig config;
-  config.gravity = 0.0;  // drifts at constant speed
-  config.goal_height = 3.0;
+  config.gravity = 0.0;      // drifts at constant speed
+  config.goal_height = 3.0;  // out of reach
   Acrobot acrobot(config);
   EXPECT_EQ(acrobot.step(0.0, 1.0).reward, -5.0);
   acrobot.set_state({0.2, 0.0, -0.2, 0.0});  // arrives at 0
@@ -109,7 +112,7 @@ TEST(AcrobotTask, PenalizesRestingAtTheDecisionInstant) {
   config.idle_angle = 0.0;
   Acrobot never(config);
   EXPECT_EQ(never.step(0.0, 1.0).reward, 0.0);
-  config.idle_angle = kPi / 5.0;
+  config.idle_angle = kPi / 5.0;  // 0.628
   Acrobot wide(config);
   wide.set_state({0.6, 0.0, 0.0, 0.0});
   EXPECT_EQ(wide.step(0.0, 1.0).reward, -5.0);
@@ -178,6 +181,7 @@ TEST(AcrobotTask, TheGoalNeedsSpeedsBelowTheScaledLimits) {
   EXPECT_FALSE(ends({3.0, 0.0, 0.0, 0.0}, 0.0));   // no speed is below 0
 }
 
+// Hanging at rest is penalized, up to the limit of 50 decisions.
 TEST(AcrobotTask, TruncatesAfterTheLastDecision) {
   Acrobot acrobot;
   for (int i = 1; i < 50; ++i) EXPECT_FALSE(acrobot.step(0.0, 1.0).truncated);
@@ -190,7 +194,7 @@ TEST(AcrobotTask, TruncatesAfterTheLastDecision) {
 }
 
 TEST(AcrobotTask, RefusesIntegrationStepsThatDoNotDivideTheDecisionInterval) {
-  for (const double bad : {0.03, 0.7, 2.0, 1e-7}) {
+  for (const double bad : {0.03, 0.7, 2.0, 1e-7}) {  // of 1 second; 1e-7 are too many steps
     EXPECT_THROW(Acrobot({.integration_step = bad}), std::invalid_argument) << bad;
   }
 }

@@ -12,8 +12,7 @@ namespace sdnn::testing {
 
 /// A code of +1, 0 and -1, as bits of the slots that are not 0 and of those that are +1.
 struct Code {
-  std::vector<std::uint64_t> active;
-  std::vector<std::uint64_t> positive;
+  std::vector<std::uint64_t> active, positive;
 
   coding::TernaryCode words() const { return {active.data(), positive.data()}; }
   /// The entry of a slot: +1, 0 or -1.

@@ -24,6 +24,7 @@ Pairs apply(Rule& rule, std::size_t sample, const std::vector<std::int32_t>& pot
   return pairs;
 }
 
+// A target is the number of units that should fire. Expected are (unit, direction) pairs.
 TEST(PDeltaRule, CorrectsTheNearestUnitsAndOfEqualOnesTheLowestIndex) {
   const std::vector<std::int32_t> potentials{5, -2, 0, 3, -2, -9};  // units 0 and 3 fire
   estimators::PDeltaRule rule(6, std::vector<double>{2.0, 4.0, 1.0, 3.49, 3.5, 0.0, 99.0, -99.0},
@@ -31,10 +32,10 @@ TEST(PDeltaRule, CorrectsTheNearestUnitsAndOfEqualOnesTheLowestIndex) {
   EXPECT_EQ(apply(rule, 0, potentials), Pairs{});  // the target of 2 is met
   // Two more shall fire: unit 2 is nearest, then units 1 and 4, of which 1 has the lower index.
   EXPECT_EQ(apply(rule, 1, potentials), (Pairs{{1, 1}, {2, 1}}));
-  EXPECT_EQ(apply(rule, 2, potentials), (Pairs{{3, -1}}));
-  EXPECT_EQ(apply(rule, 3, potentials), (Pairs{{2, 1}}));          // rounds to 3
-  EXPECT_EQ(apply(rule, 4, potentials), (Pairs{{1, 1}, {2, 1}}));  // rounds to 4
-  EXPECT_EQ(apply(rule, 5, potentials), (Pairs{{0, -1}, {3, -1}}));
+  EXPECT_EQ(apply(rule, 2, potentials), (Pairs{{3, -1}}));           // one less: 3 is nearer than 5
+  EXPECT_EQ(apply(rule, 3, potentials), (Pairs{{2, 1}}));            // rounds to 3
+  EXPECT_EQ(apply(rule, 4, potentials), (Pairs{{1, 1}, {2, 1}}));    // rounds to 4
+  EXPECT_EQ(apply(rule, 5, potentials), (Pairs{{0, -1}, {3, -1}}));  // all that fire
   EXPECT_EQ(apply(rule, 6, potentials),
             (Pairs{{1, 1}, {2, 1}, {4, 1}, {5, 1}}));  // all silent ones
   EXPECT_EQ(apply(rule, 7, potentials), (Pairs{{0, -1}, {3, -1}}));
@@ -47,7 +48,7 @@ TEST(PDeltaRule, GroupsOfUnitsAreCorrectedSeparately) {
 }
 
 TEST(PDeltaRule, CorrectsAShareOfTheDeficit) {
-  const std::vector<std::int32_t> potentials{5, -2, 0, 3, -2, -9, -4, -1, 0};  // as above
+  const std::vector<std::int32_t> potentials{5, -2, 0, 3, -2, -9, -4, -1, 0};
   estimators::PDeltaRule rule(9, std::vector<double>{3.0, 4.0, 8.0, 9.0, 0.0}, 1, 0.25);
   // A quarter of the deficit, rounded, but at least one unit: two of the nine units fire.
   EXPECT_EQ(apply(rule, 0, potentials), (Pairs{{2, 1}}));          // (3 - 2) / 4 = 0.25

@@ -50,6 +50,7 @@ Reals matrix_of(const KernelSums& kernel, const Bins& bins) {
   return matrix;
 }
 
+// The last two arguments of a kernel are its number of terms and its degree.
 TEST(KernelSums, IsTheMeanOverPairsByHand) {
   const std::vector inputs{falling(0.5, 4), InputCorrelations{{1.0, 0.25, 0.25, 1.0}, 2}};
   // The query (2, 1) correlates with the sample (0, 0) by 1/4 and 1/4, with (3, 1) by 1/2 and 1.
@@ -62,6 +63,7 @@ TEST(KernelSums, IsTheMeanOverPairsByHand) {
   EXPECT_EQ(matrix_of({{falling(0.5, 4)}, Bins{0, 1, 3}, 1, 1}, {1}), (Reals{0.5, 1.0, 0.25}));
 }
 
+// Correlations that fall by a factor are powers of it, which need no table of all pairs of bins.
 TEST(KernelSums, PowersAndTablesAgree) {
   const Bins samples = bins_of(50, 3, 40), queries = bins_of(37, 3, 31);
   const KernelSums powers({falling(0.9, 40), falling(0.7, 40), falling(0.99, 40)}, samples, 3, 2);

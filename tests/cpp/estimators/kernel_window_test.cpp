@@ -39,6 +39,7 @@ TEST(KernelWindow, IsKernelRidgeRegression) {
   EXPECT_NEAR(predicted(window, {0.0}), first + k * second, 1e-15);
 }
 
+// Arguments: the input's range, outputs, capacity in samples, length scale and ridge.
 TEST(KernelWindow, ForgetsAllButTheLastSamples) {
   KernelWindow window(Numbers{0.0}, Numbers{1.0}, 1, 20, 1.0, 0.1), fresh = window;
   for (int i = 0; i < 5000; ++i) {
@@ -74,6 +75,7 @@ TEST(KernelWindow, AddedInputsAndOutputsAreLearned) {
   EXPECT_NEAR(out[0], 0.0, 1e-12);
 }
 
+// Targets larger than 20 times their mean size are clipped.
 TEST(KernelWindow, LimitedTargetsKeepAnOutlierOut) {
   KernelWindow window(Numbers{0.0}, Numbers{1.0}, 1, 50, 1.0, 0.1, 20.0);
   for (int i = 0; i < 40; ++i) window.learn(Numbers{input_of(i)}, Numbers{i % 2 ? 1.0 : -1.0});

@@ -16,13 +16,15 @@ using estimators::StandardLibrary;
 
 constexpr std::array<std::uint32_t, 1> kSeed{1};
 
+// Microsoft's uniform_int_distribution draws again from the last incomplete multiple of 11, and
+// takes the remainder of the others.
 TEST(Libsdnn, WithTheMsvcLibraryNumbersAreRemainders) {
   LibsdnnRandom ours(kSeed, StandardLibrary::msvc);
   std::seed_seq sequence(kSeed.begin(), kSeed.end());
   std::mt19937 theirs(sequence);
   for (int i = 0; i < 1000; ++i) {
     const auto drawn = static_cast<std::uint32_t>(theirs());
-    if (drawn >= 4294967292U) continue;  // 11 * 390451572: the rest is rejected
+    if (drawn >= 11U * 390451572U) continue;  // the largest multiple of 11 that fits in 32 bits
     ASSERT_EQ(ours.uniform(-5, 5), static_cast<std::int32_t>(drawn % 11) - 5);
   }
 }

@@ -148,6 +148,7 @@ TEST(OnlineLayer, RefusesWeightsBeyond14BitsAndBadArguments) {
   EXPECT_THROW(online.present(bins, rule), std::invalid_argument);
 }
 
+// An interruption point is where long work may be stopped; StopAt(0) stops at the first one.
 TEST(Interruption, EndsTrainingInEveryFormAndPrediction) {
   const Problem problem = testing::random_problem(3);
   const auto layer = testing::layer_for(problem);

@@ -59,8 +59,7 @@ std::shared_ptr<const ParallelPerceptron::Code> code_of_three(std::size_t n_unit
     return coding::PatternTable::from_signs(signs, kBins, n_units);
   };
   const std::vector<coding::InputPair> pairs{{0, 1}, {1, 1}, {2, 0}, {1, 0}};
-  std::vector<coding::PatternTable> modified;
-  std::vector<coding::PatternTable> modifiers;
+  std::vector<coding::PatternTable> modified, modifiers;
   for (std::size_t p = 0; p < pairs.size(); ++p) {
     modified.push_back(table());
     modifiers.push_back(table());
@@ -148,8 +147,7 @@ TEST(ParallelPerceptron, RefusesWeightsThatCouldOverflow) {
 }
 
 TEST(ParallelPerceptron, RefusesBadArguments) {
-  const std::vector<std::int32_t> weights(6);
-  const std::vector<std::int32_t> thresholds(2);
+  const std::vector<std::int32_t> weights(6), thresholds(2);
   EXPECT_THROW(ParallelPerceptron(small_code(), 0, 1), std::invalid_argument);
   EXPECT_THROW(ParallelPerceptron(small_code(), 2, 1, -1), std::invalid_argument);
   EXPECT_THROW(ParallelPerceptron(small_code(), 3, weights, thresholds), std::invalid_argument);

@@ -31,7 +31,8 @@ TEST(ProbabilityMixture, SharesAloneAreTheProbabilities) {
   EXPECT_EQ(mixture.weights(), Numbers{1.0});
 }
 
-TEST(ProbabilityMixture, WeightsAreTheLikelihoodsOfShareAndThreeSteepnesses) {
+// Experts are the shares themselves, and softmaxes of the scores times 3, 6 and 12.
+TEST(ProbabilityMixture, WeightsAreTheLikelihoodsOfSharesAndThreeSteepnesses) {
   ProbabilityMixture mixture(1);
   mixture.learn(Numbers{0.5, 0.5}, Numbers{0.1, 0.6}, 1);
   // The true class 1 has the share 0.5, and by scores 0.5 apart the logistic of 0.5 * steepness.
@@ -47,6 +48,7 @@ TEST(ProbabilityMixture, WeightsAreTheLikelihoodsOfShareAndThreeSteepnesses) {
   EXPECT_NEAR(mixed(mixture, {0.5, 0.5}, {0.1, 0.6})[1], expected, 1e-15);
 }
 
+// Each of two scorers is always sure of one class; weight 0 is that of the shares.
 TEST(ProbabilityMixture, WeightsFollowADriftThatChangesTheBetterExpert) {
   ProbabilityMixture mixture(2);
   const Numbers shares{0.5, 0.5}, scores{1.0, 0.0, 0.0, 1.0};

@@ -16,8 +16,7 @@ namespace sdnn::testing {
 
 struct Problem {
   std::shared_ptr<const coding::SelectiveDesensitization> code;
-  std::size_t n_units = 0;
-  std::size_t n_groups = 1;
+  std::size_t n_units = 0, n_groups = 1;
   std::vector<std::int32_t> bins;
   std::vector<double> targets;
   std::vector<std::vector<std::int32_t>> orders;
@@ -38,8 +37,7 @@ inline coding::PatternTable random_table(std::size_t n_bins, std::size_t n_units
 /// below 0 or above the size of a group, and are clipped.
 inline Problem random_problem(std::uint64_t seed) {
   core::Random random(seed, core::Stream::exploration);
-  const std::size_t n_inputs = 1 + random.below(3);
-  const std::size_t n_bins = 1 + random.below(12);
+  const std::size_t n_inputs = 1 + random.below(3), n_bins = 1 + random.below(12);
   const std::size_t n_pattern_units = 1 + random.below(150);
   std::vector<coding::InputPair> pairs;
   for (std::size_t i = 0; i < n_inputs; ++i) {
@@ -47,8 +45,7 @@ inline Problem random_problem(std::uint64_t seed) {
       if (i != j || n_inputs == 1) pairs.push_back({i, j});
     }
   }
-  std::vector<coding::PatternTable> modified;
-  std::vector<coding::PatternTable> modifiers;
+  std::vector<coding::PatternTable> modified, modifiers;
   for (std::size_t p = 0; p < pairs.size(); ++p) {
     modified.push_back(random_table(n_bins, n_pattern_units, random));
     modifiers.push_back(random_table(n_bins, n_pattern_units, random));

@@ -54,6 +54,7 @@ TEST(RecursiveLeastSquares, MissingInputsAreTheMiddleOfTheirFirstRange) {
   EXPECT_EQ(predicted(model, {12.0, kNaN}), predicted(model, {12.0, 5.0}));
 }
 
+// The input's first range is the single value 3. Later the target is 2 less than the input.
 TEST(RecursiveLeastSquares, AnInputThatWasConstantCountsOnceItChanges) {
   RecursiveLeastSquares model(Numbers{3.0}, Numbers{3.0}, 1, 1.0);
   for (int i = 0; i < 100; ++i) model.learn(Numbers{3.0}, Numbers{1.0});
@@ -62,6 +63,7 @@ TEST(RecursiveLeastSquares, AnInputThatWasConstantCountsOnceItChanges) {
   EXPECT_NEAR(predicted(model, {3.0}), 1.0, 0.05);
 }
 
+// Later the new output is learned as 4 more than the new input 1.
 TEST(RecursiveLeastSquares, AddedInputsAndOutputsChangeNoPrediction) {
   RecursiveLeastSquares model(Numbers{0.0}, Numbers{1.0}, 2, 0.99);
   for (int i = 0; i < 50; ++i) model.learn(Numbers{i / 50.0}, Numbers{i / 25.0, 1.0});
@@ -87,15 +89,16 @@ TEST(RecursiveLeastSquares, PredictsAFifthBeyondTheRangeOfTargetsAtMost) {
   EXPECT_NEAR(predicted(model, {2.9}), 1.2, 1e-12);  // targets reached from 0 to 1
 }
 
+// Without inputs the prediction is a mean of the targets 1 and -1, and then of 1e9.
 TEST(RecursiveLeastSquares, LimitedErrorsKeepAnOutlierOut) {
-  RecursiveLeastSquares limited(Numbers{}, Numbers{}, 1, 1.0, 20.0),
-      other(Numbers{}, Numbers{}, 1, 1.0);
+  RecursiveLeastSquares limited(Numbers{}, Numbers{}, 1, 1.0, /*error_limit=*/20.0),
+      unlimited(Numbers{}, Numbers{}, 1, 1.0);
   for (int i = 0; i < 100; ++i) {
-    for (auto* model : {&limited, &other}) model->learn(Numbers{}, Numbers{i % 2 ? 1.0 : -1.0});
+    for (auto* model : {&limited, &unlimited}) model->learn(Numbers{}, Numbers{i % 2 ? 1.0 : -1.0});
   }
-  for (auto* model : {&limited, &other}) model->learn(Numbers{}, Numbers{1e9});
+  for (auto* model : {&limited, &unlimited}) model->learn(Numbers{}, Numbers{1e9});
   EXPECT_LT(std::abs(predicted(limited, {})), 0.5);
-  EXPECT_GT(predicted(other, {}), 1e6);
+  EXPECT_GT(predicted(unlimited, {}), 1e6);  // about a hundredth of 1e9
 }
 
 TEST(RecursiveLeastSquares, StaysFiniteForAnyNumbers) {

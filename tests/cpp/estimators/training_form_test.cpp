@@ -57,8 +57,8 @@ TEST(TrainingForm, MemoryOfEachFormIsThatOfItsTables) {
                 + 4 * kPadded * (128 + 32) + 2 * 128 * 128);  // 128 samples to be presented
 }
 
-/// The dual form computes an inner product of codes for every two samples: too slow for 20,000
-/// samples of 16,000 columns.
+// The dual form computes an inner product of codes for every two samples: too slow for 20,000
+// samples of 16,000 columns.
 TEST(TrainingForm, IsBlockForManySamplesOfLongCodes) {
   const auto code = demonstration_code(8000);
   const auto chosen = [&](std::size_t n_samples, std::size_t n_units) {

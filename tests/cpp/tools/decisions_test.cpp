@@ -18,8 +18,7 @@ Trial table_trial() {
 }
 
 TEST(TimeDecisions, ReturnsATimePerDecisionWithoutChangingTheTrial) {
-  Trial timed = table_trial();
-  Trial plain = table_trial();
+  Trial timed = table_trial(), plain = table_trial();
   const Times times = time_decisions(timed, 25);
   plain.advance(25);
   EXPECT_EQ(times.size(), static_cast<std::size_t>(timed.n_decisions()));

@@ -10,8 +10,7 @@ namespace {
 
 using approximators::SDNNC;
 
-constexpr int kActive =
-    30;  // n', the number of units of a window, all that a correction can change
+constexpr int kActive = 30;  // n', the units of a window, which are all that a correction changes
 
 SDNNC small_network() {
   return SDNNC(

@@ -85,6 +85,7 @@ TEST(AcrobotTrial, GoldenTraceWithoutNoise) {
   EXPECT_EQ(digest(run.rows()), 15772045298543882794U);
 }
 
+// The numbers were recorded once, like those above.
 TEST(AcrobotTrial, GoldenTraceWithNoisyRedundantSensors) {
   auto run = network_trial(
       {.sensors = {.n_sensors = 6, .noise = 0.02}, .protocol = {.episodes = 60}, .seed = 2});
@@ -94,6 +95,7 @@ TEST(AcrobotTrial, GoldenTraceWithNoisyRedundantSensors) {
   EXPECT_EQ(digest(run.rows()), 899986753393664466U);
 }
 
+// The numbers were recorded once, like those above.
 TEST(AcrobotTrial, GoldenTracesOfFuzzyQLearning) {
   auto plain = agent_trial(fuzzy_agent({}), {.protocol = {.episodes = 200}});
   plain.advance(200);
@@ -106,6 +108,7 @@ TEST(AcrobotTrial, GoldenTracesOfFuzzyQLearning) {
   EXPECT_EQ(digest(noisy.rows()), 1660777440214468387U);
 }
 
+// The numbers were recorded once, like those above.
 TEST(AcrobotTrial, GoldenTracesOfTheRBFNetwork) {
   auto plain = rbf_trial({.protocol = {.episodes = 200}});
   plain.advance(200);
@@ -117,6 +120,7 @@ TEST(AcrobotTrial, GoldenTracesOfTheRBFNetwork) {
   EXPECT_EQ(digest(noisy.rows()), 7920621632295173362U);
 }
 
+// Eight trials of different sensors, lengths and seeds advance by the same numbers of decisions.
 TEST(AcrobotTrial, TrialsRunTogetherHaveTheRowsOfTrialsRunAlone) {
   const auto make = [](std::size_t i) {
     return table_trial({.sensors = {.n_sensors = 4 + static_cast<int>(i % 3), .noise = 0.01},

@@ -10,6 +10,7 @@
 namespace sdnn::tools {
 namespace {
 
+// The product is of floats, so it differs from that of doubles by rounding.
 TEST(DenseProduct, EqualsThePlainProductAtAnySize) {
   for (const auto& [n_rows, n_columns] : std::vector<std::pair<std::size_t, std::size_t>>{
            {1, 1}, {3, 7}, {8, 16}, {9, 33}, {90, 240}, {16, 8}}) {

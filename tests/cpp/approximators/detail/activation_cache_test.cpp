@@ -16,9 +16,7 @@ TEST(ActivationCache, CachedPotentialsEqualThoseOfAFullPass) {
   const SDNNCConfig config{.n_pattern_units = 90, .n_hidden_units = 130, .n_active_units = 50};
   testing::WithWorkspace<SDNNC> network(config, 3);
   core::Random random(5, core::Stream::sensor_noise);
-  std::vector<double> centre(4);
-  std::vector<double> state(4);
-  std::vector<double> values(network.n_actions());
+  std::vector<double> centre(4), state(4), values(network.n_actions());
   std::vector<std::int32_t> potentials(network.hidden_layer().n_units());
   for (int step = 0; step < 6000; ++step) {
     if (step % 150 == 0) {
@@ -41,6 +39,7 @@ TEST(ActivationCache, CachedPotentialsEqualThoseOfAFullPass) {
     }
   }
   const auto& counts = network.own_workspace().cache().counts();
+  // All three ways were taken often.
   EXPECT_GT(counts.exact, 1000U);
   EXPECT_GT(counts.neighbour, 1000U);
   EXPECT_GT(counts.full, 20U);

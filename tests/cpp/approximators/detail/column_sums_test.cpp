@@ -80,14 +80,14 @@ TEST_P(EveryLevel, EqualsPlainSumsOn100000RandomProblems) {
   for (int problem = 0; problem < 100000; ++problem) {
     const Problem p = random_problem(random);
     Sums sums = p.start;
-    const std::size_t zeros =  // the column that fills incomplete groups
+    const std::size_t zeros =  // the last column, which fills incomplete groups
         p.block.size() / kBlockUnits - 1;
-    std::span<const std::uint32_t> columns = p.columns;
+    std::span<const std::uint32_t> left = p.columns;
     do {
-      const auto part = columns.first(std::min(ColumnPlaces::kMost, columns.size()));
-      columns = columns.subspan(part.size());
-      add_columns(p.block.data(), ColumnPlaces(part, zeros), p.group, p.factor, sums.data());
-    } while (!columns.empty());
+      const auto columns = left.first(std::min(ColumnPlaces::kMost, left.size()));
+      left = left.subspan(columns.size());
+      add_columns(p.block.data(), ColumnPlaces(columns, zeros), p.group, p.factor, sums.data());
+    } while (!left.empty());
     ASSERT_EQ(sums, plain_sums(p)) << "problem " << problem;
   }
 }

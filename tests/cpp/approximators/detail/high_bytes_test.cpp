@@ -12,39 +12,41 @@
 namespace sdnn::approximators {
 namespace {
 
-using Places = std::map<std::pair<std::uint32_t, int>, int>;
+using HighBytes = std::map<std::pair<std::uint32_t, int>, int>;
 
-Places listed(const HighByteLists& lists, std::size_t block) {
-  Places places;
-  for (const HighByte& high : lists.of(block)) places[{high.column, high.unit}] = high.value;
-  return places;
+HighBytes listed(const HighByteLists& lists, std::size_t block) {
+  HighBytes listed;
+  for (const HighByte& high : lists.of(block)) listed[{high.column, high.unit}] = high.value;
+  return listed;
 }
 
+// A list has the high bytes that are not 0, by column and unit. All changes are in block 1.
 TEST(HighByteLists, HoldRandomChangesOfABlock) {
   HighByteLists lists(/*n_blocks=*/2, /*capacity=*/12);
-  Places expected;
+  HighBytes expected;
   core::Random random(5, core::Stream::weights);
   for (int change = 0; change < 500; ++change) {
     const HighByte now{static_cast<std::uint32_t>(random.below(3)),
                        static_cast<std::uint8_t>(random.below(4)),
                        static_cast<std::int8_t>(static_cast<int>(random.below(3)) - 1)};
-    const std::pair place(now.column, int{now.unit});
-    const auto before = expected.contains(place) ? expected[place] : 0;
+    const std::pair weight(now.column, int{now.unit});
+    const auto before = expected.contains(weight) ? expected[weight] : 0;
     lists.change(1, static_cast<std::int8_t>(before), now);
-    if (now.value != 0) expected[place] = now.value;
-    if (now.value == 0) expected.erase(place);
+    if (now.value != 0) expected[weight] = now.value;
+    if (now.value == 0) expected.erase(weight);
     ASSERT_EQ(listed(lists, 1), expected);
     ASSERT_EQ(lists.size(), expected.size());
   }
   EXPECT_TRUE(lists.of(0).empty());
 }
 
-TEST(HighByteLists, CountOnlyWhatExceedsTheCapacity) {
+// Beyond its capacity a block's high bytes are counted, not listed, also when they become fewer.
+TEST(HighByteLists, CountHighBytesBeyondTheCapacityWithoutAList) {
   HighByteLists lists(/*n_blocks=*/1, /*capacity=*/3);
-  for (std::uint32_t j = 0; j < 4; ++j) lists.change(0, 0, {j, 63, 1});
+  for (std::uint32_t j = 0; j < 4; ++j) lists.change(0, 0, {j, 63, 1});  // from 0 to 1
   EXPECT_TRUE(lists.is_overfull(0));
   EXPECT_TRUE(lists.of(0).empty());
-  lists.change(0, 1, {2, 63, 0});
+  lists.change(0, 1, {2, 63, 0});  // column 2 from 1 to 0
   EXPECT_EQ(lists.size_of(0), 3U);
   EXPECT_TRUE(lists.is_overfull(0));
 }

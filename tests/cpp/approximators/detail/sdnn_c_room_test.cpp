@@ -70,13 +70,13 @@ TEST(Wiring, IsReproducibleAndThatOfTheNetwork) {
 
 TEST(Wiring, RefusesTooManySymbolsAndMissingTables) {
   SDNNCConfig config = five_inputs();
-  config.n_symbols[1] = config.n_symbols[3] = 1 << 24;
+  config.n_symbols[1] = config.n_symbols[3] = 1 << 24;  // each at its limit, too many together
   EXPECT_THROW(code_books_of(config, 1), std::length_error);
   config.n_symbols[1] = (1 << 24) + 1;
   EXPECT_THROW(code_books_of(config, 1), std::invalid_argument);
   config = five_inputs();
   auto tables = code_books_of(config, 1);
-  tables.pop_back();
+  tables.pop_back();  // four tables for five inputs
   EXPECT_THROW(wiring_of(config, tables, 1), std::invalid_argument);
 }
 

@@ -73,6 +73,7 @@ TEST(WeightAverage, AnOscillatingWeightAveragesToItsMiddle) {
             64U + 64U * 4U);  // every 10 until 640, then every n / 64: 64 ln(20000 / 640)
 }
 
+// Snapshots are taken every 10 corrections; the first one after forget is the average.
 TEST(WeightAverage, ForgetRestartsTheAverage) {
   HiddenLayer layer(1, 1);
   WeightAverage average(layer, 10);

@@ -57,7 +57,7 @@ TEST(CodedSamples, CodesArePaddedToFourWords) {
 }
 
 TEST(CodedSamples, RefuseBinsOutOfRange) {
-  const auto code = small_code(8);
+  const auto code = small_code(8);  // bins are 0 to 4
   std::vector<std::int8_t> signs(16);
   EXPECT_THROW(write_signs(code, std::vector<Bin>{0, 5}, signs), std::invalid_argument);
 }

@@ -27,8 +27,8 @@ TEST(TernaryCode, InnerProductsAreExactForAnyNumberOfWords) {
   }
 }
 
-TEST(TernaryCode,
-     InnerProductsOfFullCodesDoNotOverflow) {  // counts in bytes reach 8 * 31 at 124 words
+// Kernels count matches in bytes, which reach 8 * 31 of 255 at 124 words.
+TEST(TernaryCode, InnerProductsOfFullCodesDoNotOverflow) {
   for (const std::size_t n_words : {124U, 128U, 400U}) {
     testing::Code on{std::vector<std::uint64_t>(n_words, ~std::uint64_t{0}),
                      std::vector<std::uint64_t>(n_words, ~std::uint64_t{0})};
@@ -76,6 +76,7 @@ TEST(ColumnLists, ListTheChangesFromOneCodeToAnother) {
   }
 }
 
+// From -1 to +1 each column rises by 2, and is listed twice.
 TEST(ColumnLists, HaveRoomForChangesOfEveryColumn) {
   const std::size_t n_words = 3;
   testing::Code up{std::vector<std::uint64_t>(n_words, ~std::uint64_t{0}),
@@ -92,14 +93,14 @@ TEST(ColumnLists, HaveRoomForChangesOfEveryColumn) {
   });
 }
 
+// A group of 200 columns has four words, of which the last is filled to its bit 8.
 TEST(ColumnLists, NumberColumnsOfGroupsConsecutively) {
   core::Random random(6, core::Stream::weights);
   const std::size_t n_words = 12;
   auto code = testing::random_code(n_words, random);
-  std::vector<std::uint32_t> plus;
-  std::vector<std::uint32_t> minus;
+  std::vector<std::uint32_t> plus, minus;
   for (std::uint32_t w = 0; w < n_words; ++w) {
-    if (w % 4 == 3) {  // groups of 3 * 64 + 8 = 200 columns
+    if (w % 4 == 3) {  // 3 * 64 + 8 = 200
       code.active[w] &= 0xFF;
       code.positive[w] &= 0xFF;
     }

@@ -12,9 +12,7 @@ namespace sdnn::core {
 namespace {
 
 struct Numbers {
-  double share = 0.5;
-  double rate = 1.0;
-  double any = 0.0;
+  double share = 0.5, rate = 1.0, any = 0.0;
   int count = 1;
   std::optional<double> last = {};
   std::vector<int> sizes = {};

@@ -9,8 +9,7 @@ namespace {
 TEST(FloatingPoint, ProductsAreRoundedBeforeTheyAreAdded) {
   volatile double factor = 1.0 + 0x1p-30;
   volatile double rounded = 1.0 + 0x1p-29;
-  const double a = factor;
-  const double b = rounded;
+  const double a = factor, b = rounded;
   EXPECT_EQ(a * a - b, 0.0);
 }
 

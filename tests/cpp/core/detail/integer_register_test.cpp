@@ -13,8 +13,7 @@ template <class Integer, class Wide>
 void check_register() {
   constexpr std::size_t kSize = IntegerRegister<Integer>::kSize;
   static_assert(kSize * sizeof(Integer) == 32);
-  std::vector<Integer> added(kSize);
-  std::vector<Integer> subtracted(kSize);
+  std::vector<Integer> added(kSize), subtracted(kSize);
   for (std::size_t i = 0; i < kSize; ++i) {
     added[i] = static_cast<Integer>(3 * i);
     subtracted[i] = static_cast<Integer>(i % 2 == 0 ? 5 : -7);

@@ -27,6 +27,8 @@ TEST(Interruption, DoesNothingUntilItIsRequested) {
   EXPECT_THROW(interruption_point(), StopError);
 }
 
+// A check that is slow, such as for signals in Python, may skip points unless it should run at
+// once.
 TEST(Interruption, PassesOnWhetherToCheckImmediately) {
   static int n_at_once;
   n_at_once = 0;
@@ -38,6 +40,7 @@ TEST(Interruption, PassesOnWhetherToCheckImmediately) {
   interruption_check() = nullptr;
 }
 
+// An interruption point is where long work may be stopped; StopAt stops at the fifth one.
 TEST(Interruption, EndsTheGenerationOfPatterns) {
   Random random(1, Stream::code_books);
   const coding::AnchorConfig config{.n_units = 20, .n_anchor_patterns = 3, .n_interpolated = 4};
@@ -56,6 +59,7 @@ TEST(Interruption, DoesNotChangeTheOrderOfAShuffleThatContinues) {
   EXPECT_EQ(expected, shuffled);
 }
 
+// A stopped step leaves acrobots between two decisions, so their episodes cannot continue.
 TEST(Interruption, AStoppedStepEndsTheMovingEpisodesOfABatch) {
   environments::AcrobotBatch batch({}, 3);
   const std::vector<double> torques(3, 1.0), tolerances(3, 1.0);

@@ -47,6 +47,7 @@ TEST(Kernel, RunsTheVersionOfTheSelectedInstructionSet) {
   sdnn::testing::on_every_instruction_set([](auto level) { EXPECT_EQ(version(), level); });
 }
 
+// A version for NEON and for AVX2 is written by hand; the others are compiled from the body.
 TEST(Kernel, PrefersHandWrittenVersions) {
   sdnn::testing::on_every_instruction_set([](auto level) {
     EXPECT_EQ(mixed(), level == "avx2" || level == "neon" ? "by hand" : "generated") << level;

@@ -44,14 +44,15 @@ CodeWalk walk_through(const std::vector<testing::Code>& codes, std::size_t n_wor
   return walk;
 }
 
-/// Checks sums of random weights in [-largest, largest].
+/// Checks sums over codes of random weights in [-largest, largest]. A walk computes the sums of a
+/// code from those of the code before it.
 template <class Weight>
 void check_walk(std::int32_t largest) {
   core::Random random(8, core::Stream::weights);
-  // Potential k is the start plus the sums of codes places[k] and others[k].
+  // Potential k is the start plus the sums of the codes first[k] and second[k].
   constexpr std::int32_t kStart = 11;
-  const std::vector<std::uint16_t> places{3, 2, 2, 0, 4, 5, 7, 6, 1, 7};
-  const std::vector<std::uint16_t> others{0, 1, 2, 3, 4, 5, 6, 7, 7, 6};
+  const std::vector<std::uint16_t> first{3, 2, 2, 0, 4, 5, 7, 6, 1, 7};
+  const std::vector<std::uint16_t> second{0, 1, 2, 3, 4, 5, 6, 7, 7, 6};
   for (const std::size_t n_words : {std::size_t{1}, std::size_t{2}, kChunkWords}) {
     const auto codes = some_codes(n_words, random);
     for (std::size_t width = 16; width <= estimators::kMostUnits<Weight>; width += 16) {
@@ -66,16 +67,15 @@ void check_walk(std::int32_t largest) {
         const CodeWalk walk = walk_through(codes, n_words);
         std::vector<Weight> sums(codes.size() * width);
         estimators::sum_steps(rows.data(), width, walk, sums.data());
-        const std::vector<estimators::StepSums<Weight>> added{{sums.data(), places.data()},
-                                                              {sums.data(), others.data()}};
-        std::vector<std::int32_t> potentials(places.size() * stride, kStart);
-        estimators::add_step_sums(std::span(added), width, places.size(), potentials.data(),
-                                  stride);
-        for (std::size_t k = 0; k < places.size(); ++k) {
+        const std::vector<estimators::StepSums<Weight>> added{{sums.data(), first.data()},
+                                                              {sums.data(), second.data()}};
+        std::vector<std::int32_t> potentials(first.size() * stride, kStart);
+        estimators::add_step_sums(std::span(added), width, first.size(), potentials.data(), stride);
+        for (std::size_t k = 0; k < first.size(); ++k) {
           for (std::size_t i = 0; i < stride; ++i) {
             std::int32_t expected = kStart;
             for (std::size_t c = 0; i < width && c < 64 * n_words; ++c) {
-              expected += (codes[places[k]].at(c) + codes[others[k]].at(c)) * rows[c * width + i];
+              expected += (codes[first[k]].at(c) + codes[second[k]].at(c)) * rows[c * width + i];
             }
             ASSERT_EQ(potentials[k * stride + i], expected) << level << ' ' << width << ' ' << k;
           }

@@ -27,8 +27,8 @@ TEST(DualTraining, HasTheBitsOfPlainTrainingInDataOrder) {
 }
 
 TEST(DualTraining, HasTheBitsOfPlainTrainingOverManyWindows) {
-  const auto problem =
-      testing::with_samples(testing::random_problem(11), 1500, 11);  // windows: 128
+  constexpr std::size_t kManyWindows = 1500;  // samples, of up to 128 in a window
+  const auto problem = testing::with_samples(testing::random_problem(11), kManyWindows, 11);
   testing::compare_with_plain(testing::in_data_order(problem, /*n_rounds=*/4),
                               estimators::TrainingForm::dual, 2,
                               [](bool same) { ASSERT_TRUE(same); });
@@ -51,13 +51,13 @@ TEST(DualTraining, HasTheBitsOfPlainTrainingWithCoefficientsNearOverflow) {
 }
 
 TEST(DualTraining, HasTheBitsOfPlainTrainingWithProductsBeyond16Bits) {
-  // 2 * 20,000 columns may all be active: a product can exceed 16 bits.
-  std::vector<coding::PatternTable> tables;
-  coding::PatternTable all_on(2, 20000);
+  // Two pairs of inputs have 20,000 columns each, all active: inner products of codes are 40,000.
+  constexpr std::size_t kColumns = 20000;
+  coding::PatternTable all_on(2, kColumns);
   for (std::size_t bin = 0; bin < 2; ++bin) {
-    for (std::size_t k = 0; k < 20000; ++k) all_on.flip(bin, k);
+    for (std::size_t k = 0; k < kColumns; ++k) all_on.flip(bin, k);
   }
-  tables = {all_on, all_on};
+  const std::vector tables{all_on, all_on};
   auto problem = testing::random_problem(4);
   problem.code = std::make_shared<coding::SelectiveDesensitization>(
       tables, tables, std::vector<coding::InputPair>{{0, 1}, {1, 0}});

@@ -41,6 +41,8 @@ TEST(QueryOrder, TheHilbertCurveVisitsEveryPointInStepsOfOne) {
   }
 }
 
+// Queries are ordered so that successive ones are near each other: the walk through them is short.
+// A walk through a lattice, row by row, cannot become shorter.
 TEST(QueryOrder, KeepsTheOrderOfALatticeAndShortensThatOfRandomPoints) {
   std::vector<std::int32_t> lattice;
   for (std::int32_t x = 0; x < 30; ++x) {

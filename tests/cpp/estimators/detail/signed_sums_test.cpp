@@ -13,7 +13,8 @@
 namespace sdnn {
 namespace {
 
-/// Adds two thirds of 21 rows and subtracts the others, with entries in [-largest, largest].
+/// Adds two thirds of 21 rows and subtracts the others, with entries in [-largest, largest], of
+/// which `n_per_sum` are summed before the sum is widened.
 template <class To, class Entry>
 void check_sums(std::int32_t largest, std::size_t n_per_sum) {
   core::Random random(4, core::Stream::weights);
@@ -57,7 +58,8 @@ TEST(SignedSums, OfNoColumnsDoNotChangeSums) {
   EXPECT_EQ(to, std::vector<std::int32_t>(40, 9));
 }
 
-TEST(SignedSums, EqualPlainSumsOverRowsOfCodes) {
+// A code's words are expanded to bytes in another order of words, in chunks of two words.
+TEST(SignedSums, ExpandedCodesHaveTheEntriesOfTheirWords) {
   core::Random random(10, core::Stream::weights);
   constexpr std::size_t kChunkWords = 2;
   constexpr std::size_t kColumns = 64 * kChunkWords;

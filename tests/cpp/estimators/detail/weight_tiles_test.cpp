@@ -63,8 +63,7 @@ void check_rows(std::int32_t largest, std::size_t n_per_sum) {
     for (auto& weight : tile.span()) {
       weight = static_cast<Weight>(static_cast<std::int32_t>(random.below(span)) - largest);
     }
-    std::vector<std::uint32_t> plus(random.below(300));
-    std::vector<std::uint32_t> minus(random.below(300));
+    std::vector<std::uint32_t> plus(random.below(300)), minus(random.below(300));
     for (auto& row : plus) row = static_cast<std::uint32_t>(random.below(100));
     for (auto& row : minus) row = static_cast<std::uint32_t>(random.below(100));
     std::vector<std::int32_t> expected(width, 5);
