@@ -1,3 +1,5 @@
+"""Files that the documents name in backticks exist in the repository."""
+
 import re
 from pathlib import Path
 

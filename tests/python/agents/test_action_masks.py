@@ -33,20 +33,22 @@ class Masked(gym.Env):
         self.observation_space = gym.spaces.Box(-bound, bound, (2,), np.float64)
         self.action_space = SPACES[actions]
 
-    def parts(self):
+    def numbers_of_actions(self):
         if isinstance(self.action_space, gym.spaces.Discrete):
             return [int(self.action_space.n)]
         return self.action_space.nvec.tolist()
 
     def mask(self):
-        masks = tuple(part.copy() for part in self.allowed)
+        masks = tuple(mask.copy() for mask in self.allowed)
         return masks if len(masks) > 1 else masks[0]
 
     def begin_state(self):
         self.state = self.np_random.uniform(-1, 1, 2)
-        self.allowed = [self.np_random.integers(0, 2, n).astype(np.int8) for n in self.parts()]
-        for part in self.allowed:
-            part[self.np_random.integers(len(part))] = 1
+        self.allowed = [
+            self.np_random.integers(0, 2, n).astype(np.int8) for n in self.numbers_of_actions()
+        ]
+        for mask in self.allowed:
+            mask[self.np_random.integers(len(mask))] = 1
         return self.state.copy()
 
     def reset(self, *, seed=None, options=None):
@@ -56,8 +58,8 @@ class Masked(gym.Env):
 
     def step(self, action):
         indices = np.ravel(action) - np.ravel(getattr(self.action_space, "start", 0))
-        for index, part in zip(indices, self.allowed, strict=True):
-            assert part[index] == 1, (indices, self.allowed)
+        for index, mask in zip(indices, self.allowed, strict=True):
+            assert mask[index] == 1, (indices, self.allowed)
         self.n += 1
         reward = float(self.state[0] * indices[0])
         terminated, truncated = self.n % 7 == 6, self.n == 11
@@ -140,7 +142,7 @@ def test_targets_bootstrap_from_allowed_actions_only(agent_class):
         for action, value in ((-1, 0.0), (0, 8.0), (1, 2.0), (2, 0.0), (3, 0.0)):
             agent.learn(Transition(next_x, action, value, next_x, True))
             agent.begin_episode()
-    high, low = agent.q_values(next_x)[[1, 2]]
+    high, low = agent.q_values(next_x)[[1, 2]]  # of the actions 0 and 1; the first action is -1
     assert high > low > 0.5
 
     def learned(mask):
@@ -152,6 +154,7 @@ def test_targets_bootstrap_from_allowed_actions_only(agent_class):
 
     # SDNN-C with few units has coarse values.
     tolerance = 1.2 if agent_class is SDNNQLearning else 0.05
+    # With a reward of 0, the target is the discount 0.5 times the best allowed next value.
     value, next_values = learned(None)
     assert value == pytest.approx(0.5 * next_values.max(), abs=tolerance)
     value, next_values = learned([0, 0, 1, 0, 0])
@@ -173,12 +176,12 @@ def test_a_training_with_masks_resumes_exactly(
             return new_env(actions, unbounded)
         return gym.vector.SyncVectorEnv([lambda: new_env(actions, unbounded)] * n_envs)
 
-    def begun(*callbacks):
+    def new_training(*callbacks):
         env = masked_env()
         agent = new_agent(agent_class, env, learning=learning)
         return Training(agent, env, steps=150, callbacks=callbacks)
 
-    check_exact_resume(begun, masked_env, tmp_path / "part", [stop])
+    check_exact_resume(new_training, masked_env, tmp_path / "part", [stop])
 
 
 def test_masks_in_a_log_file_are_learned(tmp_path):
@@ -239,7 +242,7 @@ def test_continuous_actions_refuse_masks():
             agent.act(np.zeros(2), mask=[1, 0, 1])
 
 
-def test_the_wrapper_of_masks_refuses_continuous_actions_and_masks_that_are_no_functions():
+def test_the_wrapper_action_masks_refuses_continuous_actions_and_uncallable_masks():
     with pytest.raises(ValueError, match=r"^env must have discrete actions"):
         ActionMasks(gym.make("Pendulum-v1"))
     with pytest.raises(TypeError, match=r"^mask must be a function"):

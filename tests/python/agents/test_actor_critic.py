@@ -9,13 +9,7 @@ from hypothesis import given, settings, strategies as st
 from q_lambda_transcription import SMALL, VariableDiscount, random_durations, random_transitions
 from refusals import refuses
 from sdnn import _core
-from sdnn.agents import (
-    ActorCriticConfig,
-    SDNNActorCritic,
-    SDNNQLambda,
-    Transition,
-    evaluate,
-)
+from sdnn.agents import ActorCriticConfig, SDNNActorCritic, SDNNQLambda, Transition, evaluate
 from sdnn.approximators import LinearSDNNConfig
 from sdnn.export import c_header
 

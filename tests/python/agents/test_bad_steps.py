@@ -8,11 +8,11 @@ from bad_inputs import BAD
 from refusals import refuses
 from sdnn.agents import RBFQLearning, UnusableStepError, evaluate
 
-PARTS = ("reward", "terminated", "truncated")
+RESULTS = ("reward", "terminated", "truncated")
 OTHERS = {
     "a list": [False],
     "an array": np.array([False]),
-    "a word": "False",
+    "a label": "False",
     "0-d": np.array(False),
 }
 NUMBERS = {"-1", "0", "0.5", "2**20", "2**31", "2**63", "-2**63", "True", "0-d", "an array"}
@@ -56,7 +56,7 @@ class Points(gym.vector.VectorEnv):
         return np.zeros((2, 2)), {}
 
     def step(self, actions):
-        columns = {"reward": np.zeros(2), **dict.fromkeys(PARTS[1:], np.zeros(2, bool))}
+        columns = {"reward": np.zeros(2), **dict.fromkeys(RESULTS[1:], np.zeros(2, bool))}
         return np.zeros((2, 2)), *(columns | self._columns).values(), {}
 
 
@@ -70,41 +70,42 @@ def evaluated(env):
     return evaluate(RBFQLearning(env.observation_space, env.action_space, seed=1), env, 2)
 
 
-def with_value(part, value):
-    place = 1 + PARTS.index(part)
-    return lambda made: (*made[:place], value, *made[place + 1 :])
+def with_value(name, value):
+    index = 1 + RESULTS.index(name)
+    return lambda results: (*results[:index], value, *results[index + 1 :])
 
 
-def bad_values(part):
-    good = NUMBERS if part == "reward" else {"True"}
-    listed = {word: make() for word, make in BAD.items()} | OTHERS
-    return {word: value for word, value in listed.items() if word not in good}
+def bad_values(name):
+    good = NUMBERS if name == "reward" else {"True"}
+    listed = {label: make() for label, make in BAD.items()} | OTHERS
+    return {label: value for label, value in listed.items() if label not in good}
 
 
 @pytest.mark.parametrize("use", [trained, evaluated])
-@pytest.mark.parametrize("part", PARTS)
-def test_invalid_rewards_and_flags_are_refused_with_the_number_of_the_step(part, use):
-    for word, value in bad_values(part).items():
-        if part == "reward" and use is evaluated and word in ("1e308", "-1e308"):
-            continue  # which add up to a finite number
-        with pytest.raises(UnusableStepError, match=rf"step 3 of .*\b{part}\b"):
-            use(Point(with_value(part, value)))
+@pytest.mark.parametrize("name", RESULTS)
+def test_invalid_rewards_and_flags_are_refused_with_the_number_of_the_step(name, use):
+    for label, value in bad_values(name).items():
+        if name == "reward" and use is evaluated and label in ("1e308", "-1e308"):
+            continue  # a return of such rewards is finite, and nothing is learned
+        with pytest.raises(UnusableStepError, match=rf"step 3 of .*\b{name}\b"):
+            use(Point(with_value(name, value)))
 
 
-@pytest.mark.parametrize("part", PARTS[1:])
-def test_numpy_bools_end_an_episode_like_python_bools(part):
+@pytest.mark.parametrize("name", RESULTS[1:])
+def test_numpy_bools_end_an_episode_like_python_bools(name):
     for use in (trained, evaluated):
-        assert use(Point(with_value(part, np.True_))) is not None
-    assert evaluated(Point(with_value(part, np.True_))).lengths.tolist() == [3, 3]
+        assert use(Point(with_value(name, np.True_))) is not None
+    # The flag is set in step 3 of each of two evaluation episodes.
+    assert evaluated(Point(with_value(name, np.True_))).lengths.tolist() == [3, 3]
 
 
-@pytest.mark.parametrize("part", PARTS)
-def test_rewards_and_flags_of_a_vector_need_a_valid_value_for_each_environment(part):
-    for word, value in bad_values(part).items():
-        for column in (value, [value] * 3 if word == "0-d" else [value] * 2):
-            with pytest.raises(UnusableStepError, match=rf"\b{part}\b"):
-                trained(Points(**{part: column}))
-    assert trained(Points(**{part: [False, False]})).n_steps == 20
+@pytest.mark.parametrize("name", RESULTS)
+def test_rewards_and_flags_of_a_vector_need_a_valid_value_for_each_environment(name):
+    for label, value in bad_values(name).items():
+        for column in (value, [value] * 3 if label == "0-d" else [value] * 2):
+            with pytest.raises(UnusableStepError, match=rf"\b{name}\b"):
+                trained(Points(**{name: column}))
+    assert trained(Points(**{name: [False, False]})).n_steps == 20
 
 
 @pytest.mark.parametrize(
@@ -122,11 +123,11 @@ def test_invalid_observations_of_a_vector_are_refused_with_the_number_of_the_ste
 def test_results_of_another_length_or_form_are_refused(use):
     for n in (1, 4, 6):  # instead of five
         with pytest.raises(UnusableStepError, match=rf"\b{n}\b"):
-            use(Point(lambda made, n=n: (made * 2)[:n]))
+            use(Point(lambda results, n=n: (results * 2)[:n]))
     for first in (np.zeros(2), (np.zeros(2),), (np.zeros(2), None), (0.0, 0.0)):
         refuses(
             "observation",
             use,
-            Point(change_reset=lambda made, first=first: first),
+            Point(change_reset=lambda results, first=first: first),
             error=UnusableStepError,
         )

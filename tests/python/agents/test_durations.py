@@ -31,22 +31,10 @@ from stopped_training import check_exact_resume, states_equal
 UNIT = gym.spaces.Box(0.0, 1.0, (1,), np.float64)
 NEAR_OR_FAR = gym.spaces.Discrete(2)
 BAD_DURATIONS = [
-    0,
-    0.0,
-    -1.0,
-    np.nan,
-    np.inf,
-    -np.inf,
-    1e-9,
-    0.0009,
-    1e6 + 1,
-    1e300,
-    10**400,
-    "1",
-    None,
-    True,
+    0, 0.0, -1.0, np.nan, np.inf, -np.inf, 1e-9, 0.0009, 1e6 + 1, 1e300, 10**400, "1", None, True,
     np.array([1.0, 2.0]),
-]
+]  # fmt: skip
+"""Durations must be numbers from 0.001 to 1e6."""
 
 
 class Courier(gym.Env):
@@ -57,9 +45,9 @@ class Courier(gym.Env):
     worth 2 / (1 - 0.9) = 20, and a near one before them 1 + 0.9 * 20 = 19.
     """
 
-    def __init__(self, tells=True, actions=NEAR_OR_FAR):
+    def __init__(self, has_durations=True, actions=NEAR_OR_FAR):
         self.observation_space, self.action_space = UNIT, actions
-        self.metadata = {"durations": tells}
+        self.metadata = {"durations": has_durations}
 
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
@@ -105,16 +93,16 @@ def couriers(agent_class, **options):
     agent = agent_class(
         UNIT, actions, approximator=approximator, learning=learning, seed=1, **options
     )
-    return agent, lambda tells: Courier(tells, actions)
+    return agent, lambda has_durations: Courier(has_durations, actions)
 
 
 @pytest.mark.parametrize("agent_class", AGENTS)
 def test_a_long_action_with_the_higher_reward_is_chosen_only_without_durations(agent_class):
     chosen = {}
-    for tells in (False, True):
+    for has_durations in (False, True):
         agent, courier = couriers(agent_class)
-        agent.train(courier(tells), steps=4000, seed=1)
-        chosen[tells] = float(np.ravel(agent.act([0.5], explore=False))[0]) > 0
+        agent.train(courier(has_durations), steps=4000, seed=1)
+        chosen[has_durations] = float(np.ravel(agent.act([0.5], explore=False))[0]) > 0
     assert chosen == {False: True, True: False}
 
 
@@ -151,17 +139,14 @@ def agents():
     for agent_class in OFF_POLICY:
         yield agent_class.__name__, lambda agent_class=agent_class: couriers(agent_class)[0]
     yield "sarsa", lambda: SDNNQLambda(UNIT, NEAR_OR_FAR, seed=1, **OPTIONS["sarsa"])
-    yield (
-        "n steps",
-        lambda: SDNNQLearning(UNIT, NEAR_OR_FAR, seed=1, **OPTIONS["n steps"]),
-    )
+    yield ("n steps", lambda: SDNNQLearning(UNIT, NEAR_OR_FAR, seed=1, **OPTIONS["n steps"]))
 
 
 MAKERS = dict(agents())
 
 
 @pytest.mark.parametrize("name", MAKERS)
-def test_usual_durations_change_nothing_and_are_in_no_file(name):
+def test_durations_of_1_change_nothing_and_are_not_saved(name):
     agent, same, other = MAKERS[name](), MAKERS[name](), MAKERS[name]()
     for transition in random_steps(1, 60):
         agent.learn(Transition(*transition[:5]))
@@ -226,22 +211,22 @@ def test_trainings_with_durations_resume_exactly(agent_class, tmp_path):
             *outcome, _ = super().step(action)
             return *outcome, {"dt": self.np_random.uniform(0.1, 9.0)}
 
-    def begun(*callbacks):
+    def new_training(*callbacks):
         agent, courier = couriers(agent_class, observation_range=None, warm_up_steps=20)
         env = Random(True, courier(True).action_space)
         return Training(agent, env, steps=120, seed=1, callbacks=callbacks)
 
     path = tmp_path / "training.safetensors"
-    check_exact_resume(begun, lambda: begun().env, path, [7, 33, 70])
+    check_exact_resume(new_training, lambda: new_training().env, path, [7, 33, 70])
 
 
 @pytest.mark.parametrize("mode", ["NEXT_STEP", "SAME_STEP", "DISABLED"])
 @pytest.mark.parametrize("vector_class", [gym.vector.SyncVectorEnv, gym.vector.AsyncVectorEnv])
 def test_vectors_have_a_duration_for_each_environment(mode, vector_class):
-    def trained(vector_class, mode, tells=True):
+    def trained(vector_class, mode, has_durations=True):
         agent, courier = couriers(SDNNQLambda)
         envs = vector_class(
-            [lambda: courier(tells)] * 2, autoreset_mode=gym.vector.AutoresetMode[mode]
+            [lambda: courier(has_durations)] * 2, autoreset_mode=gym.vector.AutoresetMode[mode]
         )
         agent.train(envs, steps=300, seed=1)
         envs.close()
@@ -249,19 +234,21 @@ def test_vectors_have_a_duration_for_each_environment(mode, vector_class):
 
     agent = trained(gym.vector.SyncVectorEnv, "NEXT_STEP")
     assert states_equal(trained(vector_class, mode), agent)
-    assert not states_equal(trained(vector_class, mode, tells=False), agent)
+    assert not states_equal(trained(vector_class, mode, has_durations=False), agent)
 
 
-def test_a_vector_that_resets_its_environments_itself_tells_durations(monkeypatch):
+def test_durations_are_learned_from_a_vector_that_resets_its_environments_itself(monkeypatch):
     monkeypatch.setattr("sdnn.training.vectors._resets_each", lambda env: False)
 
     class Opaque(gym.vector.SyncVectorEnv):
         """A vector whose environments are not stepped one by one."""
 
-    def trained(tells, mode):
+    def trained(has_durations, mode):
         agent, courier = couriers(SDNNQLambda)
         modes = gym.vector.AutoresetMode
-        agent.train(Opaque([lambda: courier(tells)] * 2, autoreset_mode=modes[mode]), steps=300)
+        agent.train(
+            Opaque([lambda: courier(has_durations)] * 2, autoreset_mode=modes[mode]), steps=300
+        )
         return agent
 
     for mode in ("NEXT_STEP", "SAME_STEP"):
@@ -316,6 +303,7 @@ def test_imitated_returns_are_discounted_by_durations():
         Transition([1.0], 0, 8.0, [0.0], True),
     ]
     imitate(agent, steps, epochs=200)
+    # The first step takes 3.0, so that the second reward, 8, is discounted by 0.9^3.
     assert agent.q_values([0.0]).max() == pytest.approx(4 + 0.9**3 * 8, rel=0.02)
 
 

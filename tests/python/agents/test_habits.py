@@ -3,6 +3,7 @@
 import importlib
 import inspect
 import re
+from typing import NamedTuple
 
 import gymnasium as gym
 import numpy as np
@@ -148,7 +149,7 @@ def test_imports_of_other_libraries_are_refused_with_the_right_name(package):
         exec(f"from {package} import qwerty")
 
 
-def test_names_of_other_packages_are_found_where_they_are_imported():
+def test_imports_from_the_wrong_package_name_the_right_package():
     for name, package in (("load_agent", "agents"), ("ActionMasks", "environments")):
         with pytest.raises(ImportError, match=f"did you mean from sdnn.{package} import {name}"):
             exec(f"from sdnn import {name}")
@@ -174,7 +175,7 @@ def test_constructors_accept_environments_and_vectors_in_the_place_of_spaces():
     assert "observation_space" in inspect.signature(SDNNQLambda).parameters
 
 
-def test_ids_stand_for_environments():
+def test_environments_may_be_given_by_their_ids():
     agent, other = SDNNQLambda("CartPole-v1", seed=1), SDNNQLambda(gym.make("CartPole-v1"), seed=1)
     assert agent.description() == other.description()
     agent.train("CartPole-v1", steps=300)
@@ -251,7 +252,8 @@ def test_an_agent_counts_all_steps_that_it_has_learned(name, tmp_path):
 
 def test_small_curves_have_the_means_of_equal_parts():
     svg = curve_svg([1.0, 3.0, 5.0, 7.0], n_points=2)
-    # From the lower left to the upper right corner of 240 x 48 pixels with a margin of 2.
+    # Means of the pairs are 2 and 6: from the lower left to the upper right corner of 240 x 48
+    # pixels with a margin of 2.
     assert 'points="2.0,50.0 242.0,2.0"' in svg
     assert "4 returns, 2 to 6" in svg
     assert curve_svg([1.0, float("inf")]) == curve_svg([]) == ""
@@ -335,13 +337,23 @@ RETURNS_OF_PAIRS = [1, 3, 4, -1, 2, 3, 0, 5, 9, 8]
 """Their sums in pairs are 4, 3, 5, 5 and 17: better than all before after 2, 6 and 10 episodes."""
 
 
+class Part(NamedTuple):
+    returns: list
+    block_length: int | None
+
+
 @pytest.fixture
-def best_of(tmp_path):
-    """Trains in parts, each with a number of further returns and a callback, if any."""
+def steps_of_saves(tmp_path):
+    """Trains in parts, and returns the steps after which `SaveBestAgent` saved the agent.
+
+    A part has returns of episodes of one step, and the length of blocks, or None without the
+    callback.
+    """
 
     def steps_after_which_the_best_was_saved(*parts):
         path, n_learned, steps = tmp_path / "training.safetensors", 0, []
-        for returns, episodes in parts:
+        for part in parts:
+            returns, episodes = part.returns, part.block_length
             env = ScriptedReturns(returns)
             n_learned += len(returns)
             best = BestSteps(tmp_path / "best.safetensors", episodes) if episodes else Callback()
@@ -358,8 +370,9 @@ def best_of(tmp_path):
     return steps_after_which_the_best_was_saved
 
 
-def test_save_best_agent_compares_blocks_of_learned_episodes(best_of):
-    assert best_of((RETURNS_OF_PAIRS, 2)) == [2, 6, 10]
+def test_save_best_agent_saves_after_each_pair_of_episodes_with_a_better_sum(steps_of_saves):
+    # Each episode has one step. Sums of the pairs 1, 3; 4, -1; ... are 4, 3, 5, 5 and 17.
+    assert steps_of_saves(Part(RETURNS_OF_PAIRS, block_length=2)) == [2, 6, 10]
 
 
 def test_save_best_agent_refuses_impossible_lengths_of_blocks(tmp_path):
@@ -368,22 +381,26 @@ def test_save_best_agent_refuses_impossible_lengths_of_blocks(tmp_path):
 
 
 @pytest.mark.parametrize("n_first", range(1, 10))
-def test_a_resumed_training_continues_its_block_of_episodes(best_of, n_first):
+def test_a_resumed_training_continues_its_block_of_episodes(steps_of_saves, n_first):
     first, second = RETURNS_OF_PAIRS[:n_first], RETURNS_OF_PAIRS[n_first:]
-    assert best_of((first, 2), (second, 2)) == [2, 6, 10]
+    # The whole training saves after 2, 6 and 10 steps, wherever it is divided.
+    assert steps_of_saves(Part(first, block_length=2), Part(second, block_length=2)) == [2, 6, 10]
 
 
-def test_the_best_block_is_remembered_during_a_training_without_the_callback(best_of):
+def test_the_best_block_is_remembered_during_a_training_without_the_callback(steps_of_saves):
     # Only the first and the last of four pairs are better than all before, after 2 and 8 episodes.
-    assert best_of(([100, 100], 2), ([1, 1], None), ([2, 2, 101, 101], 2)) == [2, 8]
+    first, last = Part([100, 100], block_length=2), Part([2, 2, 101, 101], block_length=2)
+    without_callback = Part([1, 1], block_length=None)
+    assert steps_of_saves(first, without_callback, last) == [2, 8]
 
 
-def test_blocks_of_another_length_are_compared_anew(best_of):
+def test_blocks_of_another_length_are_compared_anew(steps_of_saves):
     # After a block of ten, the first pair is the best of its length, and later the third.
-    assert best_of(([100] * 10, 10), ([-1, -1, -2, -2, 150, 150], 2)) == [10, 12, 16]
+    ten, pairs = Part([100] * 10, block_length=10), Part([-1, -1, -2, -2, 150, 150], block_length=2)
+    assert steps_of_saves(ten, pairs) == [10, 10 + 2, 10 + 6]
 
 
-def test_two_callbacks_of_the_same_length_save_the_same_agents(tmp_path):
+def test_two_callbacks_with_blocks_of_the_same_length_save_at_the_same_steps(tmp_path):
     env = ScriptedReturns(RETURNS_OF_PAIRS)
     agent = SDNNQLambda(env, inputs="all")
     both = [BestSteps(tmp_path / name, 2) for name in ("first", "second")]
@@ -395,8 +412,9 @@ def test_two_callbacks_of_the_same_length_save_the_same_agents(tmp_path):
 
 
 @pytest.mark.parametrize("extreme", [1e300, -1e300])
-def test_extreme_returns_are_saved_and_compared(best_of, extreme):
-    assert best_of(([extreme, extreme], 2), ([0, 0, 1, 1], 2))[0] == 2
+def test_a_first_block_with_extreme_returns_is_saved(steps_of_saves, extreme):
+    saves = steps_of_saves(Part([extreme] * 2, block_length=2), Part([0, 0], block_length=2))
+    assert saves == ([2] if extreme > 0 else [2, 4]), "returns of 0 are better than -1e300"
 
 
 def test_two_evaluations_without_improvement_stop_a_training(tmp_path):
@@ -404,7 +422,6 @@ def test_two_evaluations_without_improvement_stop_a_training(tmp_path):
     # Evaluations every 10 steps: the third and fourth are no better than the second one.
     assert run(tmp_path, [1.0, 3.0, 2.0, 3.0, 9.0, 9.0], stop).n_steps == 40
     assert run(tmp_path, [1.0, 3.0, 2.0, 4.0, 3.0, 5.0], stop).n_steps == 60
-    refuses("max_evaluations", StopTrainingOnNoImprovement, 0)
 
 
 @pytest.mark.parametrize("interval", [0, -1, 2.5, None])
@@ -429,7 +446,7 @@ def test_a_training_calls_methods_replaced_on_the_instance():
 
 
 @pytest.mark.parametrize("module", ["sdnn.common", "sdnn.common.env_util"])
-def test_modules_of_stable_baselines3_are_answered_with_ours(module):
+def test_importing_modules_of_stable_baselines3_names_those_of_sdnn(module):
     with pytest.raises(ModuleNotFoundError, match=r"sdnn\.agents.*make_vec"):
         importlib.import_module(module)
 

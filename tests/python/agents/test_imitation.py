@@ -223,11 +223,9 @@ def test_wrong_agents_actions_and_datasets_are_refused_and_change_nothing():
     bad = [row, row._replace(action=2)]
     error = refuses("action", imitate, agent, bad)
     assert "episode 1, transition 1" in str(error)
-    refuses("epochs", imitate, agent, [row], epochs=0)
     refuses("agent", imitate, RBFQLearning(SQUARE, push), [row], error=TypeError)
     torque = gym.spaces.Box(-1.0, 1.0, (1,))
     refuses("agent", imitate, FuzzyQLearning(SQUARE, torque), [row], error=TypeError)
-    refuses("dataset", imitate, agent, 7, error=TypeError)
     assert states_equal(agent, unchanged)
     with pytest.raises(RuntimeError, match="warming up"):
         SDNNQLambda(SQUARE, push, warm_up_steps=9)._imitate_step(row, 0.0, 1.0)

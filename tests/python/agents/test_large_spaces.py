@@ -18,7 +18,8 @@ def test_actions_of_40_unrelated_rooms_are_learned_exactly():
     report = agent.learning_report()
     assert report["q_range"] == (0.0, 1.25)  # rewards of 0 and 1, with a margin above
     n_active = agent.approximator.n_active_units
-    fewest = n_active // 15  # a window's firing units for the lowest value; as many rest at most
+    # The lowest value has 1/15 of a window's units active, the highest all but as many.
+    fewest = n_active // 15
     assert report["value_step"] == pytest.approx(1.25 / (n_active - 2 * fewest))
     assert 0.0 < report["mean_error"] < 0.25
     assert [agent.act(room, explore=False) for room in range(40)] == right.tolist()

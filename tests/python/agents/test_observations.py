@@ -31,9 +31,10 @@ def inputs(space, **options):
 def test_ranges_are_the_bounds_of_the_space_unless_others_are_set():
     agent = sdnn_agent(BOX)
     assert not agent.is_warming_up
-    assert [end.tolist() for end in agent.observation_range] == [[-1.0, 0.0], [3.0, 10.0]]
+    lowest, highest = BOX.low.tolist(), BOX.high.tolist()
+    assert [bound.tolist() for bound in agent.observation_range] == [lowest, highest]
     agent = sdnn_agent(BOX, observation_range=(0.0, [2.0, 4.0]))
-    assert [end.tolist() for end in agent.observation_range] == [[0.0, 0.0], [2.0, 4.0]]
+    assert [bound.tolist() for bound in agent.observation_range] == [[0.0, 0.0], [2.0, 4.0]]
 
 
 def test_a_warm_up_fits_ranges_and_finds_angle_pairs():
@@ -71,10 +72,10 @@ def test_infinite_bounds_of_integer_boxes_are_unbounded(dtype):
 
 def test_lower_and_upper_bounds_are_unknown_separately():
     half = gym.spaces.Box(np.array([-np.inf, 0.0]), np.array([1.0, 1.0]), dtype=np.float64)
-    made = config(half)
-    assert (made.low, made.high) == ((None, 0.0), (None, 1.0))
-    made = config(UNBOUNDED, ([0.0, np.nan, -1.0], 2.0))
-    assert (made.low, made.high) == ((0.0, None, -1.0), (2.0, None, 2.0))
+    settings = config(half)
+    assert (settings.low, settings.high) == ((None, 0.0), (None, 1.0))
+    settings = config(UNBOUNDED, ([0.0, np.nan, -1.0], 2.0))
+    assert (settings.low, settings.high) == ((0.0, None, -1.0), (2.0, None, 2.0))
 
 
 def test_the_learning_report_shows_the_shares_of_ranges_in_use():
@@ -83,6 +84,7 @@ def test_the_learning_report_shows_the_shares_of_ranges_in_use():
     for t in range(400):
         here = {"at": [t % 9 / 9], "room": t % 3}
         agent.learn(Transition(here, 0, 0.0, here, False))
+    # "at" has the values 0, 1/9 ... 8/9 of the range from 0 to 1; a discrete "room" has no range.
     report = agent.learning_report()
     assert report["share_of_range"][0] > 0.7
     assert report["share_beyond_range"][0] == 0.0

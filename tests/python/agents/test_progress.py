@@ -1,45 +1,21 @@
 """The progress bar of a training."""
 
 import sys
-from io import StringIO
 
 import gymnasium as gym
 import pytest
-from rich.console import Console
 
-from sdnn.agents import RBFQLearning, Training
-from sdnn.training.callbacks import ProgressBarCallback
+from sdnn.agents import RBFQLearning
 
 
-@pytest.mark.parametrize("is_terminal", [True, False])
 @pytest.mark.parametrize("goal", [{"steps": 200}, {"episodes": 5}])
-def test_the_progress_bar_is_shown_on_terminals_only(is_terminal, goal):
-    env = gym.make("Pendulum-v1", max_episode_steps=40)
-    agent = RBFQLearning(env.observation_space, env.action_space)
-    text = StringIO()
-    console = Console(file=text, force_terminal=is_terminal, width=120)
-    callbacks = [ProgressBarCallback("Drifting", seconds=0.0, console=console)]
-    training = Training(
-        agent,
-        env,
-        callbacks=callbacks,
-        evaluate_every=40,
-        evaluation_env=gym.make("Pendulum-v1", max_episode_steps=40),
-        evaluation_episodes=1,
-        **goal,
-    )
-    training.run()
-    assert ("Drifting" in text.getvalue()) == is_terminal
-    if not is_terminal:
-        assert text.getvalue() == ""
-
-
-def test_train_with_progress_shows_a_bar_on_a_terminal_only(capsys, monkeypatch):
+def test_train_with_progress_shows_a_bar_on_a_terminal_only(goal, capsys, monkeypatch):
     monkeypatch.setenv("TERM", "xterm")
     for is_terminal in (False, True):
         monkeypatch.setattr(sys.stderr, "isatty", lambda: is_terminal)  # noqa: B023
-        env = gym.make("Pendulum-v1")
-        RBFQLearning(env).train(env, steps=100, progress=True)
+        env, other = (gym.make("Pendulum-v1", max_episode_steps=40) for _ in range(2))
+        evaluations = {"evaluate_every": 40, "evaluation_env": other, "evaluation_episodes": 1}
+        RBFQLearning(env).train(env, progress=True, **goal, **evaluations)
         output = capsys.readouterr()
         assert output.out == ""
         assert ("learning" in output.err) == is_terminal

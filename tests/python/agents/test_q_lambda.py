@@ -105,7 +105,7 @@ def test_excursions_resume_exactly_and_take_allowed_actions(when, tmp_path):
         agent.n_environments = 2
         return agent
 
-    def lived(agent, cuts):
+    def run_with_saves(agent, saved_steps):
         n_in_excursions = 0
         for step in range(4400):
             rng, i = np.random.default_rng(step), step % 2
@@ -116,7 +116,7 @@ def test_excursions_resume_exactly_and_take_allowed_actions(when, tmp_path):
             transition = Transition(observation, action, rng.normal(), next_observation, False)
             if when == "after learning":
                 agent.learn(transition, environment=i)
-            if step in cuts:
+            if step in saved_steps:
                 n_in_excursions += len(excursions_of(agent)) > 0
                 agent.save(tmp_path / "agent.safetensors")
                 agent = load_agent(tmp_path / "agent.safetensors")
@@ -124,9 +124,9 @@ def test_excursions_resume_exactly_and_take_allowed_actions(when, tmp_path):
                 agent.learn(transition, environment=i)
         return agent, n_in_excursions
 
-    resumed, n_in_excursions = lived(new_agent(), range(4200, 4400, 10))
+    resumed, n_in_excursions = run_with_saves(new_agent(), range(4200, 4400, 10))
     assert n_in_excursions > 3
-    assert states_equal(lived(new_agent(), ())[0], resumed)
+    assert states_equal(run_with_saves(new_agent(), ())[0], resumed)
 
 
 def test_a_step_that_the_agent_did_not_take_is_learned_after_an_excursion():

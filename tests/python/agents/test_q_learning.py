@@ -1,3 +1,5 @@
+"""Q-learning with SDNN-C: its NumPy transcription, presets, actions and scaled observations."""
+
 import dataclasses
 
 import gymnasium as gym
@@ -49,6 +51,7 @@ def test_the_numpy_transcription_and_the_core_learn_the_same_trial(n_inputs, noi
         before = trial.n_decisions
         trial.advance(1)
         steps.append(trial.n_decisions - before)
+    # Printed lines are "episode 1: 50 steps, ...".
     assert [int(line.split()[2]) for line in lines] == steps
     core = trial.agent.networks[0]
     assert np.array_equal(core.weights(), network.weights)
@@ -71,7 +74,7 @@ def test_presets_are_used_unless_settings_are_passed():
     robust = SDNNQLearning(OBSERVATIONS, TORQUES, preset="robust")
     assert (robust.n_actions, robust.learning.n_steps) == (61, 5)
     paper_agent = SDNNQLearning(OBSERVATIONS, TORQUES, preset="paper")
-    assert paper_agent.n_actions == 601
+    assert paper_agent.n_actions == 900 - 300 + 1  # windows of 300 of the paper's 900 units
     assert paper_agent.learning == QLearningConfig()
     with_settings = SDNNQLearning(
         OBSERVATIONS, TORQUES, learning=QLearningConfig(discount=0.5), preset="robust"

@@ -29,15 +29,15 @@ def states_equal(state, other_state):
     )
 
 
-def check_exact_resume(begun, env, path, cuts, **options):
-    """Check that trainings of ``begun(*callbacks)`` that stop at a cut end as the whole one does.
+def check_exact_resume(new_training, env, path, cuts, **options):
+    """Check that trainings of ``new_training(*callbacks)`` resume exactly after steps of ``cuts``.
 
     ``env()`` is the environment that a stopped one is loaded with. Returns the whole one.
     """
-    whole = begun()
+    whole = new_training()
     rows = whole.run().rows
     for cut in cuts:
-        before = begun(Stop(cut, path)).run()
+        before = new_training(Stop(cut, path)).run()
         assert not before.is_finished
         again = Training.load(path, env(), **options)
         assert (*before.rows, *again.run().rows) == rows
