@@ -20,20 +20,20 @@ STEPS_BEYOND_WARM_UP = 1100
 """More than the steps of a warm-up."""
 
 
-def exact():
+def cartpole():
     return gym.make("CartPole-v1")
 
 
-def positions():
-    env, indices = exact(), [0, 2]
+def cartpole_positions():
+    env, indices = cartpole(), [0, 2]
     space = env.observation_space
     return gym.wrappers.TransformObservation(
         env, lambda x: x[indices], gym.spaces.Box(space.low[indices], space.high[indices])
     )
 
 
-def noisy():
-    env, random = exact(), np.random.default_rng(1)
+def noisy_cartpole():
+    env, random = cartpole(), np.random.default_rng(1)
     deviation = np.array([0.24, 0.3, 0.02, 0.35])
     return gym.wrappers.TransformObservation(
         env, lambda x: x + deviation * random.standard_normal(4), env.observation_space
@@ -43,7 +43,8 @@ def noisy():
 @pytest.mark.filterwarnings("ignore:.*is not within the observation space")
 @pytest.mark.parametrize("agent_class", [SDNNQLambda, SDNNActorCritic])
 @pytest.mark.parametrize(
-    ("task", "history"), [(exact, "none"), (positions, "differences"), (noisy, "observer")]
+    ("task", "history"),
+    [(cartpole, "none"), (cartpole_positions, "differences"), (noisy_cartpole, "observer")],
 )
 def test_history_auto_selects_what_a_task_needs(agent_class, task, history):
     agent = agent_class(task(), seed=1, angle_pairs="find")
@@ -85,15 +86,15 @@ def test_an_actor_critic_that_knows_angles_finds_an_observer_for_a_noisy_pendulu
 
 
 @pytest.mark.parametrize("agent_class", [SDNNQLambda, SDNNActorCritic])
-def test_auto_begins_no_warm_up(agent_class):
+def test_without_unknown_ranges_and_inputs_history_auto_begins_no_warm_up(agent_class):
     ranges = {"observation_range": ([-5, -5, -1, -5], [5, 5, 1, 5])}
-    agent = agent_class(exact(), inputs="all", angle_pairs=[], **ranges)
+    agent = agent_class(cartpole(), inputs="all", angle_pairs=[], **ranges)
     assert (agent.is_warming_up, agent.history, agent.finds_history) == (False, "none", False)
     assert not any(name.startswith("history") for name in agent.state())
-    assert agent_class(exact(), inputs="all", angle_pairs=[], history="observer").is_warming_up
+    assert agent_class(cartpole(), inputs="all", angle_pairs=[], history="observer").is_warming_up
 
 
-def test_the_history_by_default_is_auto_in_the_general_presets_alone():
+def test_only_general_presets_look_for_a_history_by_default():
     def history(agent_class, **settings):
         return agent_class(gym.make("Pendulum-v1"), **settings).finds_history
 
@@ -112,7 +113,7 @@ def test_an_agent_that_finds_no_history_learns_the_bits_of_one_without(settings)
     """
 
     def task():
-        env, random = exact(), np.random.default_rng(1)
+        env, random = cartpole(), np.random.default_rng(1)
         high = np.concatenate([env.observation_space.high, np.ones(6, np.float32)])
         return gym.wrappers.TransformObservation(
             env,
@@ -132,30 +133,30 @@ def test_an_agent_that_finds_no_history_learns_the_bits_of_one_without(settings)
 
 @pytest.mark.parametrize("history", ["differences", "averages", "observer"])
 def test_a_loaded_agent_with_a_history_acts_and_learns_as_the_saved_one(history, tmp_path):
-    agent = SDNNQLambda(positions(), seed=1, history=history)
-    agent.train(positions(), steps=STEPS_BEYOND_WARM_UP, seed=1)
+    agent = SDNNQLambda(cartpole_positions(), seed=1, history=history)
+    agent.train(cartpole_positions(), steps=STEPS_BEYOND_WARM_UP, seed=1)
     agent.save(tmp_path / "agent.safetensors")
     loaded = load_agent(tmp_path / "agent.safetensors")
     assert loaded.history == history
     for resumed in (agent, loaded):
-        resumed.train(positions(), steps=20, seed=2)
+        resumed.train(cartpole_positions(), steps=20, seed=2)
     assert states_equal(agent, loaded)
 
 
 def test_evaluations_do_not_change_the_history_of_the_current_episode():
-    agents = [SDNNQLambda(positions(), seed=1, history="differences") for _ in range(2)]
+    agents = [SDNNQLambda(cartpole_positions(), seed=1, history="differences") for _ in range(2)]
     for agent in agents:
-        agent.train(positions(), steps=STEPS_BEYOND_WARM_UP, seed=1)
+        agent.train(cartpole_positions(), steps=STEPS_BEYOND_WARM_UP, seed=1)
         agent.begin_episode()
-        agent.act(positions().reset(seed=3)[0])
-    evaluate(agents[0], positions(), episodes=2, seed=1)
-    observation = positions().reset(seed=4)[0]
+        agent.act(cartpole_positions().reset(seed=3)[0])
+    evaluate(agents[0], cartpole_positions(), episodes=2, seed=1)
+    observation = cartpole_positions().reset(seed=4)[0]
     assert agents[0].act(observation) == agents[1].act(observation)
 
 
 def test_environments_of_a_vector_have_separate_histories():
-    envs = gym.vector.SyncVectorEnv([positions] * 3)
-    agent = SDNNQLambda(positions(), seed=1, history="differences")
+    envs = gym.vector.SyncVectorEnv([cartpole_positions] * 3)
+    agent = SDNNQLambda(cartpole_positions(), seed=1, history="differences")
     agent.train(envs, steps=3000, seed=1)
     assert agent.history == "differences"
     assert {name.split(".")[1] for name in agent.state() if name.startswith("last_states.")} >= {
@@ -163,10 +164,9 @@ def test_environments_of_a_vector_have_separate_histories():
     }  # fmt: skip
 
 
-def test_the_value_after_a_truncated_log_is_that_of_its_own_episode():
-    # It does not depend on the episode that was imitated before.
-    agent = SDNNQLambda(positions(), seed=1, history="differences")
-    agent.train(positions(), steps=STEPS_BEYOND_WARM_UP, seed=1)
+def test_the_value_after_a_truncated_episode_of_a_log_does_not_depend_on_earlier_episodes():
+    agent = SDNNQLambda(cartpole_positions(), seed=1, history="differences")
+    agent.train(cartpole_positions(), steps=STEPS_BEYOND_WARM_UP, seed=1)
     first, second = ([Transition([x, 0.0], 0, 1.0, [x + 0.1, 0.0], False)] for x in (-2.0, 1.0))
     values = []
     for earlier in ([], first):
@@ -179,13 +179,13 @@ def test_the_value_after_a_truncated_log_is_that_of_its_own_episode():
 
 def test_an_observer_that_cannot_be_fitted_is_refused_or_warned_of():
     with pytest.raises(ValueError, match=r"history must be .* fewer than 100 warm_up_steps"):
-        SDNNQLambda(exact(), history="observer", warm_up_steps=50)
+        SDNNQLambda(cartpole(), history="observer", warm_up_steps=50)
     many = gym.spaces.Box(-1.0, 1.0, (17,))
     with pytest.raises(ValueError, match=r"history must be .* more than 16 numeric inputs"):
         SDNNQLambda(many, gym.spaces.Discrete(2), history="observer", inputs="all", angle_pairs=[])
     with pytest.raises(ValueError, match=r"history must be .* discrete"):
         SDNNQLambda(gym.spaces.Discrete(5), gym.spaces.Discrete(2), history="differences")
-    agent = SDNNQLambda(positions(), history="observer")
+    agent = SDNNQLambda(cartpole_positions(), history="observer")
     log = [Transition([0.0, 0.1 * i], i % 2, 1.0, [0.0, 0.1], False) for i in range(20)]
     with pytest.warns(UserWarning, match="fewer than 100 transitions"):
         imitate(agent, log)
@@ -207,7 +207,7 @@ def test_a_training_prints_the_history_that_was_found(invoke, tmp_path):
 
 def test_missing_codes_and_a_history_exclude_each_other():
     with pytest.raises(ValueError, match="history"):
-        SDNNQLambda(exact(), history="auto", missing="code")
+        SDNNQLambda(cartpole(), history="auto", missing="code")
 
 
 def test_an_agent_with_differences_of_a_single_relevant_input_is_saved(tmp_path):

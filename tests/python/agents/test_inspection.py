@@ -110,6 +110,7 @@ def test_symbols_of_a_dictionary_that_decide_are_found():
     agent = SDNNQLambda(env, seed=1, **FIXED)
     agent.train(env, steps=4000)
     first, *_ = ranked(agent, env)
+    # Flattened, columns 0 to 2 are the colours, 3 to 6 the four gears, and 7 the speed.
     assert (first.input.name, first.input.type, first.input.columns) == (
         "gear", "symbol", (3, 4, 5, 6)
     )  # fmt: skip
@@ -385,6 +386,7 @@ def test_masked_actions_are_in_no_map_and_no_greedy_episode(agent_class):
     at = over_one.axes[0]
     numbers = states.rows[:, 0]
     is_met = np.abs(at[:, None] - numbers).min(axis=1) < (at[1] - at[0]) / 2
+    # Actions that are allowed in the part of the axis around each point, half a gap to its right.
     possible = 1 + ((at + (at[1] - at[0]) / 2 + 1.0) * 1.5).astype(int)
     assert is_met.mean() > 0.5
     assert (over_one.actions[:, 0] < possible)[is_met].all()

@@ -71,7 +71,7 @@ def waves():
 @pytest.mark.parametrize("make", [Anneal, waves])
 @pytest.mark.parametrize("env_id", ["Pendulum-v1", "CartPole-v1"])
 def test_a_training_with_rates_set_by_callbacks_resumes_exactly(make, env_id, tmp_path):
-    def begun(*callbacks):
+    def new_training(*callbacks):
         env = gym.make(env_id)
         agent = SDNNQLearning(
             env.observation_space, env.action_space, approximator=SMALL, warm_up_steps=50
@@ -80,7 +80,7 @@ def test_a_training_with_rates_set_by_callbacks_resumes_exactly(make, env_id, tm
 
     cuts = (1, 30, 49, 50, 51, 120, 199)
     whole = check_exact_resume(
-        begun, lambda: gym.make(env_id), tmp_path / "t", cuts, callbacks=[make()]
+        new_training, lambda: gym.make(env_id), tmp_path / "t", cuts, callbacks=[make()]
     )
     assert {"agent.learning_rate", "agent.epsilon"} <= whole.agent.state().keys()
 

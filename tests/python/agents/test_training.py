@@ -521,26 +521,26 @@ def test_a_training_stopped_inside_an_episode_resumes_exactly(agent_type, tmp_pa
     def env():
         return gym.make("Pendulum-v1", max_episode_steps=40)
 
-    def begun(*callbacks):
+    def new_training(*callbacks):
         agent = make(env(), seed=3, **options)
         return Training(agent, env(), steps=300, seed=9, callbacks=callbacks)
 
     cuts = np.random.default_rng(5).integers(1, 300, 12)
-    check_exact_resume(begun, env, tmp_path / "t", cuts)
+    check_exact_resume(new_training, env, tmp_path / "t", cuts)
 
 
 def test_a_training_stopped_before_or_after_the_end_of_its_warm_up_resumes_exactly(tmp_path):
     env = gym.make("CartPole-v1")
 
-    def begun(*callbacks):
+    def new_training(*callbacks):
         agent = SDNNQLearning(env, approximator=SMALL, warm_up_steps=200)
         return Training(agent, env, steps=500, callbacks=callbacks)
 
-    agent = begun().agent
+    agent = new_training().agent
     assert agent.is_warming_up
     refuses("observation_range", agent.q_values, env.reset()[0], error=RuntimeError)
     cuts = (1, 150, 199, 200, 201, 350)
-    whole = check_exact_resume(begun, lambda: env, tmp_path / "t", cuts)
+    whole = check_exact_resume(new_training, lambda: env, tmp_path / "t", cuts)
     assert not whole.agent.is_warming_up
     assert whole.agent.learning_report()["n_corrections"] > 480, (
         "also in the warm-up's 200 of 500 steps"
@@ -557,11 +557,11 @@ def test_a_training_with_missing_observations_resumes_exactly(missing, tmp_path)
         def _observation(self):
             return np.array([np.inf if self._at == 1 else self._at])
 
-    def begun(*callbacks):
+    def new_training(*callbacks):
         agent = SDNNQLearning(Echo(), approximator=SMALL, observation_range=(0, 4), missing=missing)
         return Training(agent, Echo(), steps=60, callbacks=callbacks)
 
-    check_exact_resume(begun, Echo, tmp_path / "t", range(1, 10))
+    check_exact_resume(new_training, Echo, tmp_path / "t", range(1, 10))
 
 
 def test_resuming_refuses_an_environment_that_does_not_reproduce_its_episode(tmp_path):
@@ -726,20 +726,20 @@ def test_a_training_continues_after_a_warning_that_is_an_error():
 
 
 def test_evaluations_every_5_episodes_come_at_their_ends_and_resume_exactly(tmp_path):
-    def begun(*callbacks):
+    def new_training(*callbacks):
         return Training(
             corridor_agent(), Corridor(), episodes=30, evaluate_every_episodes=5,
             evaluation_env=Corridor(), evaluation_episodes=2, callbacks=callbacks,
         )  # fmt: skip
 
-    rows = begun().run().rows
+    rows = new_training().run().rows
     evaluations = [row for row in rows if row["kind"] == "evaluation"]
     assert [row["episode"] for row in evaluations] == [5, 10, 15, 20, 25, 30]
     assert all(len(row["lengths"]) == len(row["terminated"]) == 2 for row in evaluations)
     ends = {row["step"] for row in rows if row["kind"] == "episode"}
     assert {row["step"] for row in evaluations} <= ends
     cuts = (3, 20, 47, evaluations[2]["step"])
-    check_exact_resume(begun, Corridor, tmp_path / "t", cuts, evaluation_env=Corridor())
+    check_exact_resume(new_training, Corridor, tmp_path / "t", cuts, evaluation_env=Corridor())
 
 
 def test_with_seed_none_no_reset_has_a_seed_and_no_episode_can_be_repeated(tmp_path):
@@ -839,14 +839,14 @@ def test_patience_counts_evaluations_from_before_a_training_was_loaded(tmp_path)
     # Every evaluation, after each 10 steps, reaches the threshold: the third one stops.
     stop = StopTrainingOnRewardThreshold(mean_return=-np.inf, patience=3)
 
-    def begun(*callbacks):
+    def new_training(*callbacks):
         return Training(
             corridor_agent(), Corridor(), steps=100, callbacks=[stop, *callbacks],
             evaluate_every=10, evaluation_env=Corridor(),
         )  # fmt: skip
 
     whole = check_exact_resume(
-        begun,
+        new_training,
         Corridor,
         tmp_path / "t",
         (15, 20, 25, 29),

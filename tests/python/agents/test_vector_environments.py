@@ -217,10 +217,10 @@ def test_batched_acrobots_have_the_bits_of_single_ones_and_resume_exactly(tmp_pa
     def acrobots(mode=None):
         return gym.make_vec("sdnn/AcrobotSwingUp-v0", num_envs=3, vectorization_mode=mode)
 
-    def begun(*callbacks):
+    def new_training(*callbacks):
         return Training(agent(), acrobots(), steps=400, callbacks=callbacks)
 
-    whole = check_exact_resume(begun, acrobots, tmp_path / "t", (100, 302, 355))
+    whole = check_exact_resume(new_training, acrobots, tmp_path / "t", (100, 302, 355))
     of_singles = Training(agent(), acrobots("sync"), steps=400)
     of_singles.run()
     assert states_equal(whole.agent, of_singles.agent)
@@ -457,12 +457,11 @@ def test_learn_each_learns_up_to_the_first_bad_transition():
     for i in range(3):
         assert by_hand.act(observations[i], environment=i) == actions[i]
     by_hand.learn(Transition(observations[0], actions[0], -1.0, observations[0] + 1, False), 0)
-    rewards, going = [-1.0, np.nan, -1.0], [False] * 3
+    rewards, no_end = [-1.0, np.nan, -1.0], [False] * 3
 
     def learn(environments, n_next=3):
-        following = observations[:n_next] + 1
-        ends = (going, going, environments, 3, 0, None)
-        return core.learn_each(observations, actions, rewards, following, *ends)
+        steps = (observations, actions, rewards, observations[:n_next] + 1, no_end, no_end)
+        return core.learn_each(*steps, environments, most=3, n_steps=0, goal=None)
 
     assert learn([0, 1, 2]) == 1
     assert states_equal(agent, by_hand)
@@ -479,9 +478,10 @@ def test_learn_each_ends_with_an_episode_and_sets_the_progress_before():
     core, _, batch, _ = agent.core_parts()
     actions = batch([None] * 4)
     core.act_each(observations, [0, 1, 2, 3], actions)
-    ends = ([False] * 4, [False, False, True, False], [0, 1, 2, 3])
-    step = (observations, actions, [0.0] * 4, observations + 1)
-    assert core.learn_each(*step, *ends, 4, 10, 40) == 3
-    assert core.progress == 12 / 40
-    assert core.learn_each(*step, *ends, 1, 13, 40) == 1
-    assert core.progress == 14 / 40
+    terminated, truncated, environments = [False] * 4, [False, False, True, False], [0, 1, 2, 3]
+    steps = (observations, actions, [0.0] * 4, observations + 1, terminated, truncated)
+    # The third transition ends an episode: only the two before it, after 10, set the progress.
+    assert core.learn_each(*steps, environments, most=4, n_steps=10, goal=40) == 3
+    assert core.progress == (10 + 2) / 40
+    assert core.learn_each(*steps, environments, most=1, n_steps=13, goal=40) == 1
+    assert core.progress == (13 + 1) / 40

@@ -7,13 +7,7 @@ import gymnasium as gym
 import numpy as np
 
 from c_policies import STRICT, box, lies_between, run
-from sdnn.agents import (
-    ActorCriticConfig,
-    QLambdaConfig,
-    SDNNActorCritic,
-    SDNNQLambda,
-    Transition,
-)
+from sdnn.agents import ActorCriticConfig, QLambdaConfig, SDNNActorCritic, SDNNQLambda, Transition
 from sdnn.approximators import LinearSDNNConfig
 from sdnn.export import export_c_header
 

@@ -5,16 +5,7 @@ import warnings
 
 import numpy as np
 
-from c_estimators import (
-    PREDICT,
-    compiled,
-    labels,
-    lacking,
-    numbers,
-    rows_in_c,
-    targets,
-    words,
-)
+from c_estimators import PREDICT, compiled, labels, lacking, numbers, rows_in_c, targets, words
 from c_policies import run
 from sdnn import SDNNKernelClassifier, SDNNKernelRidge
 from sdnn.coding import Circular, RandomInverse, Symbolic, WithMissing

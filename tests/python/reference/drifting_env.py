@@ -36,19 +36,19 @@ class DriftingEnv(gym.Env):
 
 
 class BrokenEnv(DriftingEnv):
-    """Breaks at a step of its life: gives a reward that is none, or raises an error."""
+    """Has a reward of NaN at a step since it was made, or raises an error there."""
 
-    def __init__(self, at=250, error="", kind="RuntimeError", render_mode=None):
+    def __init__(self, bad_step=250, error="", kind="RuntimeError", render_mode=None):
         super().__init__(render_mode=render_mode)
-        self.at, self.error, self.kind = at, error, getattr(builtins, kind)
+        self.bad_step, self.error, self.kind = bad_step, error, getattr(builtins, kind)
         self.n_steps = 0
 
     def step(self, action):
         self.n_steps += 1
         observation, reward, *ends = super().step(action)
-        if self.n_steps == self.at and self.error:
+        if self.n_steps == self.bad_step and self.error:
             raise self.kind(self.error)
-        return observation, np.nan if self.n_steps == self.at else reward, *ends
+        return observation, np.nan if self.n_steps == self.bad_step else reward, *ends
 
 
 class RestlessEnv(DriftingEnv):

@@ -1,3 +1,5 @@
+"""Learning curves: grouped runs, medians and quartiles, figures and CSV files."""
+
 import csv
 import json
 
@@ -15,44 +17,27 @@ from sdnn.runs.trial import TrialRows
 CONFIG = run_spec(environment=EnvironmentSpec(id="CartPole-v1"))
 
 
-def make(folder, config, returns=(), evaluations=(), every=20):
+def fake_run(folder, config, returns=(), evaluations=(), every=20):
     """Make a run that nobody trained: an episode every 10 steps, an evaluation every 20 or so."""
     run = Run.create(folder, config)
     rows = [
-        {
-            "kind": "episode",
-            "step": 10 * (n + 1),
-            "episode": n,
-            "return": float(value),
-            "length": 10,
-            "terminated": True,
-        }
-        for n, value in enumerate(returns)
-    ]
+        {"kind": "episode", "step": 10 * n, "episode": n - 1, "return": float(value), "length": 10,
+         "terminated": True}
+        for n, value in enumerate(returns, 1)
+    ]  # fmt: skip
     rows += [
-        {
-            "kind": "evaluation",
-            "step": every * (n + 1),
-            "episode": n,
-            "returns": list(values),
-            "lengths": [10] * len(values),
-            "terminated": [True] * len(values),
-        }
-        for n, values in enumerate(evaluations)
-    ]
+        {"kind": "evaluation", "step": every * n, "episode": n - 1, "returns": list(values),
+         "lengths": [10] * len(values), "terminated": [True] * len(values)}
+        for n, values in enumerate(evaluations, 1)
+    ]  # fmt: skip
+    settings = {"config": run.spec.canonical_json(), "version": "0.1"}
     with ResultStore(folder) as store:
-        store.extend(
-            run.key,
-            TrialRows.from_training(rows),
-            0,
-            config=run.spec.canonical_json(),
-            version="0.1",
-        )
+        store.extend(run.key, TrialRows.from_training(rows), 0, **settings)
     return run
 
 
 def test_a_single_run_has_curves_of_returns_running_medians_and_evaluations(tmp_path):
-    run = make(tmp_path / "run", CONFIG, [1, 5, 3], [[1, 2, 3, 4, 10], [5, 5, 5, 5, 5]])
+    run = fake_run(tmp_path / "run", CONFIG, [1, 5, 3], [[1, 2, 3, 4, 10], [5, 5, 5, 5, 5]])
     returns, medians, evaluations = curves_of([run])[0]
     assert (returns.task, returns.agent) == ("CartPole-v1", "sdnn-c general")
     assert (returns.kind, returns.steps.tolist(), returns.values.tolist()) == (
@@ -60,13 +45,14 @@ def test_a_single_run_has_curves_of_returns_running_medians_and_evaluations(tmp_
     )  # fmt: skip
     assert (medians.kind, medians.values.tolist()) == ("running median", [1, 3, 3])
     assert (evaluations.kind, evaluations.steps.tolist()) == ("evaluation", [20, 40])
+    # The means of the evaluations; low and high are the quartiles of their returns.
     assert evaluations.values.tolist() == [4, 5]
     assert evaluations.low.tolist() == [2, 5]
     assert evaluations.high.tolist() == [4, 5]
 
 
 def test_the_running_median_spans_twenty_episodes(tmp_path):
-    run = make(tmp_path / "run", CONFIG, range(50))
+    run = fake_run(tmp_path / "run", CONFIG, range(50))
     _, medians = curves_of([run])[0]
     assert medians.values[-1] == np.median(range(30, 50))
 
@@ -74,17 +60,13 @@ def test_the_running_median_spans_twenty_episodes(tmp_path):
 def test_runs_of_one_task_are_one_curve_with_quartiles(tmp_path):
     means = ([0, 1], [2, 1], [4, 3, 9])
     runs = [
-        make(
-            tmp_path / str(seed),
-            run_spec(CONFIG, seed=seed),
-            [7],
-            [[value] for value in means[seed]],
-        )
+        fake_run(tmp_path / str(seed), run_spec(CONFIG, seed=seed), [7], [[m] for m in means[seed]])
         for seed in range(3)
     ]
     *_, curve = curves_of(runs)[0]
     assert (curve.kind, curve.n_runs) == ("evaluation", 3)
     assert curve.steps.tolist() == [20, 40]  # which all of them have
+    # Medians and quartiles over the runs of the means 0, 2, 4 and 1, 1, 3.
     assert curve.values.tolist() == [2, 1]
     assert curve.low.tolist() == [1, 1]
     assert curve.high.tolist() == [3, 2]
@@ -94,7 +76,7 @@ def test_runs_of_one_task_are_one_curve_with_quartiles(tmp_path):
 
 def test_runs_of_different_seeds_keep_their_episodes_and_share_running_medians(tmp_path):
     returns = [1, 5, 3], [3, 3, 9, 9]
-    runs = [make(tmp_path / str(n), run_spec(CONFIG, seed=n), returns[n]) for n in range(2)]
+    runs = [fake_run(tmp_path / str(n), run_spec(CONFIG, seed=n), returns[n]) for n in range(2)]
     *episodes, medians = curves_of(runs)[0]
     assert [(curve.kind, curve.run) for curve in episodes] == [
         ("return", str(run.folder)) for run in runs
@@ -108,7 +90,7 @@ def test_runs_of_different_seeds_keep_their_episodes_and_share_running_medians(t
 
 
 def test_running_medians_of_long_runs_have_few_points(tmp_path):
-    runs = [make(tmp_path / str(n), run_spec(CONFIG, seed=n), range(2_000)) for n in range(2)]
+    runs = [fake_run(tmp_path / str(n), run_spec(CONFIG, seed=n), range(2_000)) for n in range(2)]
     medians = curves_of(runs)[0][-1]
     assert len(medians.steps) == MAX_POINTS
     assert medians.steps[[0, -1]].tolist() == [10, 20_000]
@@ -118,7 +100,7 @@ def test_running_medians_of_long_runs_have_few_points(tmp_path):
 def test_legends_name_each_agent_and_each_type_of_line_once(tmp_path):
     other = run_spec(CONFIG, settings={"learning": {"discount": 0.9}})
     runs = [
-        make(tmp_path / f"{n}-{seed}", run_spec(spec, seed=seed), [1, 2], [[3]])
+        fake_run(tmp_path / f"{n}-{seed}", run_spec(spec, seed=seed), [1, 2], [[3]])
         for n, spec in enumerate((CONFIG, other))
         for seed in range(2)
     ]
@@ -139,7 +121,7 @@ def test_runs_of_other_tasks_or_settings_are_separate_curves(tmp_path):
     )
     set_otherwise = run_spec(CONFIG, settings={"learning": {"discount": 0.9}})
     runs = [
-        make(tmp_path / str(n), config, [1])
+        fake_run(tmp_path / str(n), config, [1])
         for n, config in enumerate((CONFIG, noisy, set_otherwise))
     ]
     curves = curves_of(runs)[0]
@@ -180,13 +162,8 @@ def test_only_runs_that_differ_in_seed_and_output_are_grouped(tmp_path):
         for seed in (1, 2):
             folder = tmp_path / f"{n}-{seed}"
             Run(folder, config).folder.mkdir()
-            (folder / "config.json").write_text(
-                json.dumps(
-                    run_spec(
-                        config, seed=seed, checkpoint_every=seed, tensorboard=seed == 2
-                    ).values()
-                )
-            )
+            other = run_spec(config, seed=seed, checkpoint_every=seed, tensorboard=seed == 2)
+            (folder / "config.json").write_text(json.dumps(other.values()))
             folders[folder] = n
     groups = groups_of([Run.open(folder) for folder in folders])
     assert [[folders[run.folder] for run in group.runs] for group in groups] == [
@@ -229,17 +206,11 @@ def test_later_goals_at_steps_that_depend_on_the_seed_keep_runs_grouped(tmp_path
 
 def test_runs_evaluated_at_different_steps_are_separate_curves(tmp_path):
     runs = [
-        make(
-            tmp_path / str(every),
-            run_spec(CONFIG, evaluate_every=every),
-            [1, 2],
-            [[3]],
-            every=every,
-        )
-        for every in (500, 700)
+        fake_run(tmp_path / f"{n}", run_spec(CONFIG, evaluate_every=n), [1, 2], [[3]], every=n)
+        for n in (500, 700)
     ]
     third = run_spec(CONFIG, environment=EnvironmentSpec(id="Acrobot-v1"))
-    runs.append(make(tmp_path / "other", third, [1]))
+    runs.append(fake_run(tmp_path / "other", third, [1]))
     curves, notes = curves_of(runs)
     assert notes == []
     assert [
@@ -252,16 +223,18 @@ def test_runs_evaluated_at_different_steps_are_separate_curves(tmp_path):
 
 
 def test_runs_of_different_lengths_keep_their_lengths(tmp_path):
-    runs = [make(tmp_path / str(n), run_spec(CONFIG, steps=20 * n), [], [[3]] * n) for n in (2, 5)]
+    runs = [
+        fake_run(tmp_path / str(n), run_spec(CONFIG, steps=20 * n), [], [[3]] * n) for n in (2, 5)
+    ]
     assert [curve.steps[-1] for curve in curves_of(runs)[0]] == [40, 100]
 
 
 def test_notes_name_runs_and_evaluations_that_are_omitted(tmp_path):
     seeds = [run_spec(CONFIG, seed=seed) for seed in range(4)]
-    whole = make(tmp_path / "whole", seeds[0], [1], [[2], [4], [6]])
-    short = make(tmp_path / "short", seeds[1], [1], [[0], [2]])
-    begun = make(tmp_path / "begun", seeds[2], [1])
-    empty = make(tmp_path / "empty", seeds[3])
+    whole = fake_run(tmp_path / "whole", seeds[0], [1], [[2], [4], [6]])
+    short = fake_run(tmp_path / "short", seeds[1], [1], [[0], [2]])
+    begun = fake_run(tmp_path / "begun", seeds[2], [1])
+    empty = fake_run(tmp_path / "empty", seeds[3])
     curves, notes = curves_of([whole, short, begun, empty])
     assert {c.run for c in curves if c.kind == "return"} == {
         str(run.folder) for run in (whole, short, begun)
@@ -277,15 +250,20 @@ def test_notes_name_runs_and_evaluations_that_are_omitted(tmp_path):
         ("running median", 2, ""), ("evaluation", 1, str(whole.folder)),
     ]  # fmt: skip
     assert [note.partition(":")[0] for note in notes] == [str(begun.folder)]
-    late = make(tmp_path / "late", run_spec(CONFIG, seed=9), [], [[1]], every=30)
+    late = fake_run(tmp_path / "late", run_spec(CONFIG, seed=9), [], [[1]], every=30)
     curves, notes = curves_of([short, late])
     assert {curve.kind for curve in curves} == {"return", "running median"}
     assert notes == [f"{short.folder}, {late.folder}: their evaluations have no step in common"]
-    refuses(empty.folder.name, curves_of, [empty, make(tmp_path / "new", CONFIG)], error=RunError)
+    refuses(
+        empty.folder.name,
+        curves_of,
+        [empty, fake_run(tmp_path / "new", CONFIG)],
+        error=RunError,
+    )
 
 
 def test_figures_and_csv_files_are_written_in_every_format(tmp_path):
-    run = make(tmp_path / "run", CONFIG, [1.25], [[1, 2]])
+    run = fake_run(tmp_path / "run", CONFIG, [1.25], [[1, 2]])
     magic = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
     for suffix, first in magic.items():
         figure, numbers = write_curves(curves_of([run])[0], tmp_path / "new" / f"x{suffix}")
@@ -299,7 +277,7 @@ def test_figures_and_csv_files_are_written_in_every_format(tmp_path):
 
 
 def test_levels_are_dotted_lines_with_labels_and_rows_without_a_step(tmp_path):
-    curves, _ = curves_of([make(tmp_path / "run", CONFIG, [1, 100])])
+    curves, _ = curves_of([fake_run(tmp_path / "run", CONFIG, [1, 100])])
     levels = [
         Level(task="CartPole-v1", title=title, value=value)
         for title, value in (("goal", 475.0), ("PPO", 474.0), ("random actions", 1.234))
@@ -319,7 +297,7 @@ def test_levels_are_dotted_lines_with_labels_and_rows_without_a_step(tmp_path):
 
 
 def test_runs_without_rows_and_a_missing_matplotlib_are_refused(tmp_path, monkeypatch):
-    run = make(tmp_path / "run", CONFIG)
+    run = fake_run(tmp_path / "run", CONFIG)
     with pytest.raises(RunError, match="nothing to draw"):
         curves_of([run])
     monkeypatch.setattr("sdnn.runs.report.find_spec", lambda name: None)

@@ -81,14 +81,6 @@ def test_a_missing_dask_names_the_package_to_install(monkeypatch, refused):
 
 
 @pytest.mark.parametrize(
-    ("name", "value"),
-    [("scheduler", ""), ("scheduler_timeout", 0.0), ("scheduler_timeout", float("nan"))],
-)
-def test_bad_schedulers_and_timeouts_are_refused_by_name(name, value):
-    refuses(name, DaskExecutor, **{"scheduler": "127.0.0.1:8786"} | {name: value})
-
-
-@pytest.mark.parametrize(
     ("options", "words"),
     [
         ("--executor ray", "--executor"),

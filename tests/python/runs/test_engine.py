@@ -1,3 +1,5 @@
+"""The engine runs planned trials in parallel and stores them."""
+
 import io
 import os
 import signal
@@ -99,6 +101,7 @@ def test_stored_trials_are_not_run_again(tmp_path, run):
     run(tmp_path, fake_trial.make_plan(2), make)
     assert len(run_seeds) == 2 * len(fake_trial.CASES) == 4
     outcome, digest = run(tmp_path, fake_trial.make_plan(3), make)
+    # Three trials of two cases, of which two each are stored.
     assert (outcome.n_planned, outcome.n_reused, outcome.n_run) == (6, 4, 2)
     assert len(run_seeds) == 6
     assert run(tmp_path, fake_trial.make_plan(3), make) == (
@@ -119,7 +122,8 @@ def test_trials_of_another_seed_or_length_are_run_again(tmp_path, run, change):
 def test_the_observer_receives_begin_progress_and_end_of_every_trial(tmp_path, run):
     recorder = fake_trial.Recorder()
     run(tmp_path, fake_trial.make_plan(2), observer=recorder)
-    assert recorder.events[0] == ("begun", 4, 0, 4 * 300)  # trials, stored ones, episodes
+    # Two trials of each of two cases, no stored ones, and all their episodes.
+    assert recorder.events[0] == ("begun", 2 * 2, 0, 2 * 2 * 300)
     for planned in fake_trial.make_plan(2):
         mine = [event for event in recorder.events[1:] if event[1] == planned.key]
         assert mine[0] == ("advanced", planned.key, 0)
@@ -300,7 +304,7 @@ def test_an_executor_is_closed_when_the_store_fails(tmp_path, run, record, monke
 def test_trials_that_end_together_are_stored_in_one_transaction(tmp_path, run, use_trial):
     use_trial(fake_trial.FakeTrial)
     plan = fake_trial.make_plan(2)
-    seen = []
+    numbers_stored = []
 
     class AllAtOnce(ThreadExecutor):
         def run(self, planned, stop):
@@ -308,15 +312,15 @@ def test_trials_that_end_together_are_stored_in_one_transaction(tmp_path, run, u
 
     with ResultStore(tmp_path / "out") as store:
 
-        def look(message):
+        def count_stored(message):
             if isinstance(message, Finished):
-                seen.append(len(store.keys()))
+                numbers_stored.append(len(store.keys()))
 
         statements = []
         store._connection.set_trace_callback(statements.append)
-        run_trials(plan, store, executor=AllAtOnce(1), observer=look)
+        run_trials(plan, store, executor=AllAtOnce(1), observer=count_stored)
         assert records_digest(store.load()) == run(tmp_path / "one by one", plan)[1]
-    assert seen == [len(plan)] * len(plan)
+    assert numbers_stored == [len(plan)] * len(plan)
     assert statements.count("COMMIT") == 1
 
 

@@ -170,7 +170,7 @@ def test_warnings_name_narrow_use_collapse_and_rounded_rewards(trained):
     assert any("rounded" in text for text in rounded.warnings())
 
 
-def test_constant_inputs_are_said_and_masked_actions_left_out(trained):
+def test_warnings_name_constant_inputs_and_maps_leave_out_masked_actions(trained):
     masks = ("--set", "environment.action_masks=true", "--set", "agent.inputs=all")
     inspection = inspect_run(Run.open(trained("tests/Masked-v0", *masks, steps=1500)))
     warnings = inspection.warnings()

@@ -1,3 +1,9 @@
+"""Measures of a trial: when the task was learned, the final performance, and its collapse.
+
+Evaluations come every 10 episodes; one of 50 steps has not solved the task. The task is learned
+where the median of 10 evaluations in a row is at most 10 steps, and mastered where that of 50 is.
+"""
+
 import math
 
 import numpy as np
@@ -11,7 +17,7 @@ def episodes(steps):
     return 10 * np.arange(1, len(steps) + 1)
 
 
-def of_rows(name, steps, returns=None):
+def measure(name, steps, returns=None):
     """A measure of a trial that took so many steps in tests every 10 episodes."""
     steps = np.asarray(steps)
     returns = np.zeros(steps.size) if returns is None else np.asarray(returns)
@@ -41,10 +47,10 @@ def test_episodes_to_learn_end_at_the_first_good_window_that_begins_solved(steps
 
 
 def test_final_measures_use_the_last_50_evaluations():
-    steps = [3] * 100 + [50] * 24 + [4] * 26
-    assert of_rows("final_steps", steps) == 4.0
+    steps = [3] * 100 + [50] * 24 + [4] * 26  # 26 of the last 50 solve the task, 52 %
+    assert measure("final_steps", steps) == 4.0
     assert final_share_solved([s < 50 for s in steps]) == 0.52
-    assert of_rows("final_steps", [8, 9]) == 8.5
+    assert measure("final_steps", [8, 9]) == 8.5
 
 
 @pytest.mark.parametrize(
@@ -70,25 +76,25 @@ def test_fewer_than_50_evaluations_have_no_episode_of_collapse():
 
 
 def test_early_steps_are_the_median_of_the_tests_in_the_first_2500_episodes():
-    steps = [4] * 150 + [8] * 100 + [50] * 750
-    assert of_rows("early_steps", steps) == 4.0
-    assert of_rows("early_steps", [50] * 251) == 50.0
+    steps = [4] * 150 + [8] * 100 + [50] * 750  # 250 evaluations in 2,500 episodes
+    assert measure("early_steps", steps) == 4.0
+    assert measure("early_steps", [50] * 251) == 50.0
 
 
 @pytest.mark.parametrize("n_tests", [1, 9, 10, 49, 50, 137])
 def test_measures_are_within_bounds_for_trials_of_any_length(n_tests):
     steps = np.random.default_rng(n_tests).integers(1, 51, n_tests)
     assert episodes_to_learn(episodes(steps), steps) > 0
-    assert 1 <= of_rows("final_steps", steps) <= 50
+    assert 1 <= measure("final_steps", steps) <= 50
     assert 0 <= final_share_solved(steps < 50) <= 1
 
 
 def test_mean_and_final_returns_average_all_or_the_last_tenth():
     def mean_and_final(returns):
         steps = np.full(len(returns), 50)
-        return [of_rows(name, steps, returns) for name in ("mean_return", "final_return")]
+        return [measure(name, steps, returns) for name in ("mean_return", "final_return")]
 
     returns = np.arange(40.0)
     assert mean_and_final(returns) == [19.5, 37.5]  # 36 to 39
-    assert mean_and_final(returns[:19])[1] == 18.0
+    assert mean_and_final(returns[:19])[1] == 18.0  # a tenth of 19 is the last one
     assert mean_and_final([-3.0]) == [-3.0, -3.0]

@@ -1,3 +1,5 @@
+"""Recordings of an evaluation episode as GIF and MP4."""
+
 import re
 import subprocess
 

@@ -1,3 +1,5 @@
+"""Runs in folders: exact resuming after stops and kills, later goals, and damaged files."""
+
 import errno
 import json
 import random
@@ -45,9 +47,8 @@ WARMING_UP = run_spec(CONFIG, environment=EnvironmentSpec(id="tests/Drifting-v0"
 
 def contents(run):
     """All of a run that must not depend on kills."""
-    files = {name: (run.folder / name).read_bytes() for name in (
-        "checkpoint.safetensors", "agent.safetensors"
-    )}  # fmt: skip
+    names = ("checkpoint.safetensors", "agent.safetensors")
+    files = {name: (run.folder / name).read_bytes() for name in names}
     return files | {"rows": run.rows()}
 
 
@@ -160,7 +161,7 @@ def test_a_target_return_stops_a_run_until_a_new_goal_replaces_it(tmp_path):
     config = run_spec(CONFIG, target_return=-1e9)  # which every evaluation reaches
     run = Run.create(tmp_path / "run", config)
     outcome = run.train()
-    assert (outcome.n_steps, outcome.reason) == (90, "target")
+    assert (outcome.n_steps, outcome.reason) == (90, "target")  # at the first evaluation
     assert outcome.last_evaluation["step"] == 90
     again = Run.open(run.folder).train()  # as if killed right after the evaluation
     assert (again.n_steps, again.reason) == (90, "target")

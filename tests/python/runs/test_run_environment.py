@@ -1,3 +1,5 @@
+"""Environments of runs: ranges, sensor noise and redundant variables."""
+
 import re
 
 import gymnasium as gym

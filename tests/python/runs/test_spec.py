@@ -1,3 +1,5 @@
+"""Specifications of runs: defaults, errors with their key, hashes, and the agents they make."""
+
 import json
 import pickle
 from dataclasses import replace

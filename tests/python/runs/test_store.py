@@ -1,3 +1,5 @@
+"""The SQLite store of trials: exact rows, digests, and recovery after a kill."""
+
 import os
 import shutil
 import signal

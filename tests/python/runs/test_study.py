@@ -197,9 +197,6 @@ def test_without_cases_the_base_environment_is_the_only_case(study):
     assert config.label == "q-lambda-general"
 
 
-RANGES = "environment.ranges.1 = [-4, 4]\nenvironment.ranges.3 = [-4, 4]\n"
-
-
 def test_a_study_may_mix_the_papers_acrobot_with_other_environments(study):
     loaded = study(
         """
@@ -366,8 +363,7 @@ def test_check_skips_trials_that_are_stored(study, monkeypatch):
     ],
 )
 def test_settings_that_make_trials_incomparable_are_refused(study, settings, key):
-    refuses(
-        key,
-        study(f"[base]\nenvironment.id = 'CartPole-v1'\n{RANGES}{settings}\n").check,
-        error=ConfigError,
-    )
+    # Trials are compared at their evaluations: steps need `evaluate_every`, episodes
+    # `evaluate_every_episodes`, and none may end early, at a target return.
+    cartpole = study(f"[base]\nenvironment.id = 'CartPole-v1'\n{settings}\n")
+    refuses(key, cartpole.check, error=ConfigError)

@@ -61,7 +61,7 @@ def test_the_rows_and_trials_of_all_variants_are_written(invoke, tmp_path):
     assert [(t["case"], t["variant"], t["trial"]) for t in trials[:3]] == [
         ("s4", "base", "0"), ("s4", "base", "1"), ("s4", "discount=0.8", "0"),
     ]  # fmt: skip
-    assert len(trials) == 12
+    assert len(trials) == 2 * 3 * 2, "cases, variants, trials"
     table = json.loads((tmp_path / "out" / "mine-table.json").read_text())
     shares = table["results"][0]["measures"]["final_share_solved"]["trials"]
     assert [float(t["final_share_solved"]) for t in trials[:2]] == shares
@@ -142,9 +142,9 @@ def test_a_failing_trial_omits_its_variant_only(invoke, tmp_path):
     result = invoke("sweep", "mine.toml", trial=Raising)
     assert result.exit_code == 1
     failure = " (discount=0.8) failed: OverflowError: a weight would leave its range"
-    assert result.stderr.count(failure) == 2
-    assert "6 of 8 " in result.stdout
-    assert " 1 of 6 " in result.stdout
+    assert result.stderr.count(failure) == 2, "both trials of the discount 0.8 with 6 sensors"
+    assert "6 of 8 " in result.stdout, "trials"
+    assert " 1 of 6 " in result.stdout, "incomplete combinations of a variant and a case"
     table = json.loads((tmp_path / "results" / "mine-table.json").read_text())
     assert [(r["case"], r["variant"]) for r in table["results"]] == [
         ("s4", "base"), ("s4", "discount=0.8"), ("s4", "discount=0.9"),
@@ -161,8 +161,10 @@ def test_dry_run_counts_and_estimates_without_making_a_file(invoke, tmp_path):
     result = invoke("sweep", "mine.toml", "--dry-run")
     assert result.exit_code == 0
     assert [p.name for p in tmp_path.iterdir()] == ["mine.toml"]
+    # A line for each of two cases with the base and two discounts, and one for all. The discount
+    # 0.9 is the base's: eight trials, two of each case with two different discounts.
     lines = result.stdout.splitlines()
-    assert len(lines) == 7
+    assert len(lines) == 2 * 3 + 1
     assert lines[0].startswith(
         "s4 base: 2 trials x 300 episodes of sdnn-c, 0 of them stored in results; a trial takes"
     )
@@ -173,8 +175,8 @@ def test_dry_run_counts_and_estimates_without_making_a_file(invoke, tmp_path):
     assert "1 of them stored in results" in lines[0]
     assert "(from 1 stored trial)" in lines[0]
     forecast = json.loads(invoke("sweep", "mine.toml", "--dry-run", "--json", "--jobs", 3).stdout)
-    assert (forecast["planned"], forecast["stored"], forecast["jobs"]) == (8, 4, 3)
-    assert len(forecast["trials"]) == 6
+    assert (forecast["planned"], forecast["stored"], forecast["jobs"]) == (8, 8 // 2, 3)
+    assert len(forecast["trials"]) == 2 * 3, "cases and variants"
     invoke("sweep", "mine.toml")
     printed = json.loads(invoke("sweep", "mine.toml", "--dry-run", "--json").stdout)
     assert printed["seconds"] == 0.0

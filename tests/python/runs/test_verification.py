@@ -305,11 +305,11 @@ def test_environments_that_do_not_repeat_themselves_are_named(invoke):
 
 def test_a_trial_that_fails_here_is_named(invoke):
     task = "drifting_env:tests/Broken-v0"
-    train = ("train", task, "--steps", 150, *SMALL, "--env-arg", "at=10000", "--out", "run")
+    train = ("train", task, "--steps", 150, *SMALL, "--env-arg", "bad_step=10000", "--out", "run")
     assert invoke(*train).exit_code == 0
     with ResultStore("run") as store:
         (record,) = store.load()
-    broken = with_config(record, lambda v: v["environment"]["kwargs"].update(at=50))
+    broken = with_config(record, lambda v: v["environment"]["kwargs"].update(bad_step=50))
     difference = only_difference(verify_folder(stored(Path("out"), [broken]), TRUSTED))
     assert "fails here" in difference.problem
     assert not difference.was_run
@@ -389,7 +389,7 @@ def test_a_certificate_can_be_verified_and_names_no_computer(certificate):
     values, path = certificate
     verification = verify(CertifiedReports(path))
     assert (verification.is_equal, verification.has_rows) == (True, False)
-    assert len(verification.equal) == len(values["trials"]) == 4
+    assert len(verification.equal) == len(values["trials"]) == 4  # two trials of two agents
     assert socket.gethostname() not in path.read_text()
     assert set(values) == {
         "format", "version", "packages", "instruction_set", "platform", "configurations", "trials"
