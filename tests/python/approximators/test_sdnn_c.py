@@ -1,3 +1,5 @@
+"""The network SDNN-C: its NumPy transcription, its pattern tables, and its Python class."""
+
 import numpy as np
 import pytest
 import sdnn_q_learning as page
@@ -53,15 +55,15 @@ def next_state(rng, state):
     return np.clip(state + 0.05 * rng.standard_normal(state.size), 0.0, 1.0)
 
 
-def assert_equal_parameters(core, slow):
-    assert np.array_equal(core.weights(), slow.weights)
-    assert np.array_equal(core.thresholds(), slow.thresholds)
+def assert_equal_parameters(core, transcription):
+    assert np.array_equal(core.weights(), transcription.weights)
+    assert np.array_equal(core.thresholds(), transcription.thresholds)
 
 
 def compare_while_learning(config, seed, n_steps, compare_weights_every):
     """Train core and transcription alike; return the share of steps that change weights."""
     core = _core.SDNNC(config, seed)
-    slow = transcribe(core)
+    transcription = transcribe(core)
     rng = np.random.default_rng(seed)
     state = rng.random(config.n_inputs)
     span = config.q_high - config.q_low
@@ -69,18 +71,18 @@ def compare_while_learning(config, seed, n_steps, compare_weights_every):
     for step in range(n_steps):
         action = int(rng.integers(core.n_actions))
         q_hat = config.q_low + span * float(rng.uniform(-0.2, 1.2))
-        expected = slow.values(state)
+        expected = transcription.values(state)
         assert np.array_equal(core.values(state), expected), step
         assert core.value(state, action) == expected[action]
         core.update(state, action, q_hat)
-        n_corrected += slow.update(state, action, q_hat) > 0
+        n_corrected += transcription.update(state, action, q_hat) > 0
         next_observation = next_state(rng, state)
         if step % compare_weights_every == 0:
-            assert np.array_equal(core.potentials(state), slow.potentials(state)), step
-            assert_equal_parameters(core, slow)
+            assert np.array_equal(core.potentials(state), transcription.potentials(state)), step
+            assert_equal_parameters(core, transcription)
         state = next_observation
-    assert np.array_equal(core.potentials(state), slow.potentials(state))
-    assert_equal_parameters(core, slow)
+    assert np.array_equal(core.potentials(state), transcription.potentials(state))
+    assert_equal_parameters(core, transcription)
     return n_corrected / n_steps
 
 
@@ -106,19 +108,21 @@ def test_sdnn_c_of_unusual_settings_equals_its_transcription(name):
 @settings(max_examples=10, deadline=None, derandomize=True)
 @given(
     n_inputs=st.integers(2, 4),
-    m=st.integers(2, 70),
-    n=st.integers(1, 140),
+    n_pattern_units=st.integers(2, 70),
+    n_hidden_units=st.integers(1, 140),
     window=st.floats(0, 1),
     lattice=st.integers(1, 8),
     seed=st.integers(0, 2**64 - 1),
 )
-def test_sdnn_c_of_any_size_equals_its_transcription(n_inputs, m, n, window, lattice, seed):
-    n_corrected = 1 + round(window * (n - 1))
+def test_sdnn_c_of_any_size_equals_its_transcription(
+    n_inputs, n_pattern_units, n_hidden_units, window, lattice, seed
+):
+    n_active = 1 + round(window * (n_hidden_units - 1))
     config = _core.SDNNCConfig(
         n_inputs=n_inputs,
-        n_pattern_units=m,
-        n_hidden_units=n,
-        n_active_units=n_corrected,
+        n_pattern_units=n_pattern_units,
+        n_hidden_units=n_hidden_units,
+        n_active_units=n_active,
         lattice=lattice,
         initial_threshold=20.0,
     )
@@ -139,7 +143,7 @@ def test_pattern_tables_of_two_inputs_are_uncorrelated():
     network = _core.SDNNC(_core.SDNNCConfig(), 5)
     first, second = (network.table(mu).astype(int) for mu in (0, 1))
     anchors = [45 * i for i in range(8)]
-    # Balanced random patterns of 200 units: a product of standard deviation about 14.
+    # Products of balanced random patterns of 200 units have a deviation of sqrt(200) = 14.1.
     assert np.abs(first[anchors] @ second[anchors].T).max() < 5 * 14.2
     off_diagonal = first[anchors] @ first[anchors].T - 200 * np.eye(8, dtype=int)
     assert np.abs(off_diagonal).max() < 5 * 14.2
@@ -156,9 +160,6 @@ def test_the_learning_coefficient_scales_weights_but_not_values():
     assert np.array_equal(small.values(state), large.values(state))
     assert np.array_equal(64 * small.weights(), large.weights())
     assert np.array_equal(64 * small.thresholds(), large.thresholds())
-
-
-# The Python face.
 
 
 @pytest.mark.parametrize(

@@ -68,8 +68,10 @@ def test_drawn_patterns_scatter_about_the_expected_correlations(name):
 def test_bins_are_half_open_and_clipped_or_circular():
     anchor = Anchor(n_anchor_patterns=3, n_interpolated=1, low=0.0, high=4.0).fit(UNIT, 8)
     column = np.array([-1, 0, 0.99, 1, 2.5, 3.999, 4, 99])
+    # Four bins of width 1, from 0 to 4.
     assert anchor.bins(column).tolist() == [0, 0, 0, 1, 2, 3, 3, 3]
     circle = Circular(period=4.0, origin=1.0, n_anchor_patterns=5, n_interpolated=0).fit(UNIT, 8)
+    # Four bins of a circle that begins at 1 and repeats after 4.
     assert circle.bins(np.array([1, 2, 3, 4, 5, 0.99, -3, 1 - 1e-18])).tolist() == [
         0, 1, 2, 3, 0, 3, 0, 0,
     ]  # fmt: skip
@@ -230,6 +232,7 @@ def test_missing_and_unknown_values_have_the_last_bin():
     coding = WithMissing(base=Anchor(n_anchor_patterns=3, n_interpolated=1)).fit(numbers, 8)
     assert (coding.base.low, coding.base.high, coding.size) == (0.0, 4.0, 4 + 1)
     assert coding.ends() == (0.0, 4.0)
+    # Four bins from 0 to 4, and bin 4 for missing values.
     assert coding.bins(numbers).tolist() == [3, 4, 0, 4, 4]
     assert coding.bins(np.array([2.0, np.nan])).tolist() == [2, 4]
     np.testing.assert_array_equal(coding.patterns(8, 5)[:-1], coding.base.patterns(8, 5))

@@ -31,7 +31,7 @@ def test_inner_products_of_long_codes_approach_the_kernel(coding, pairs):
 
 def test_the_kernel_of_one_and_two_inputs_is_as_worked_by_hand():
     coding = RandomInverse(n_bins=11, n_flipped=10, low=0.0, high=1.0)
-    rho = 1 - 4 * 10 / 100
+    rho = 1 - 4 * 10 / 100  # correlation of neighbouring bins; of bins at distance 2, rho^2
     of_two = kernel.AnalyticKernel(coding, n_inputs=2, n_units=100)
     matrix = of_two(np.array([[0.05, 0.05]]), np.array([[0.15, 0.05], [0.15, 0.25]]))
     expected = [((1 + rho) / 2 + rho) / 2, ((1 + rho) / 2 * rho**2 + (1 + rho**2) / 2 * rho) / 2]

@@ -1,8 +1,9 @@
+"""Checks of arguments: types of numbers, and the argument that an error carries."""
+
 import gymnasium as gym
 import numpy as np
 import pytest
 
-from refusals import refuses
 from sdnn.agents import RBFQLearning, SDNNQLearning
 from sdnn.approximators import RBFNetworkConfig, SDNNCConfig
 from sdnn.support import arguments
@@ -22,12 +23,6 @@ def test_real_accepts_numbers_of_python_and_numpy(value):
     number = arguments.real("x", value)
     assert number == value
     assert type(number) is float
-
-
-@pytest.mark.parametrize("seed", [-1, 2**64, None, 1.5])
-def test_seeds_outside_64_bits_are_refused(seed):
-    refuses("seed", arguments.seed_of, seed)
-    assert arguments.seed_of(2**64 - 1) == 2**64 - 1
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,4 @@
-import os
-import subprocess
-import sys
+"""Instruction sets of the processor: equal bits on each, and how one is selected."""
 
 import pytest
 
@@ -58,12 +56,10 @@ def test_unknown_instruction_sets_are_refused_and_change_nothing(name):
         set_instruction_set(2)
 
 
-@pytest.mark.parametrize(("value", "expected"), [("portable", "portable"), ("sse9", "sse9")])
-def test_the_environment_variable_selects_an_instruction_set_or_is_refused(value, expected):
+def test_the_environment_variable_selects_an_instruction_set():
     code = "import sdnn; print(sdnn.instruction_set())"
-    process = python("-c", code, env=environment(SDNN_INSTRUCTION_SET=value))
-    assert expected in process.stdout + process.stderr
-    assert (process.returncode == 0) == (value == "portable")
+    process = python("-c", code, env=environment(SDNN_INSTRUCTION_SET="portable"))
+    assert (process.returncode, process.stdout) == (0, "portable\n")
 
 
 def test_an_unknown_instruction_set_in_the_environment_raises_an_error():
@@ -75,14 +71,7 @@ def test_an_unknown_instruction_set_in_the_environment_raises_an_error():
     )
     lines = ["import sdnn, sdnn.approximators, sdnn.environments"]
     lines += [f"try: {call}\nexcept ValueError as error: print(error)" for call in calls]
-    environment = os.environ | {"SDNN_INSTRUCTION_SET": "foo"}
-    process = subprocess.run(
-        [sys.executable, "-c", "\n".join(lines)],
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    process = python("-c", "\n".join(lines), env=environment(SDNN_INSTRUCTION_SET="foo"))
     printed = process.stdout.splitlines()
     assert len(printed) == len(calls)
     assert all("instruction set" in line and "got foo" in line for line in printed)

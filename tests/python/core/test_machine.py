@@ -1,3 +1,5 @@
+"""The name of the processor and the number of its cores."""
+
 import os
 import platform
 

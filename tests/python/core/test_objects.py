@@ -93,7 +93,7 @@ def test_a_trial_refuses_other_threads_while_it_advances():
         np.testing.assert_array_equal(trial.test_rows()[name], column)
 
 
-def trainer_of(layer, form="auto", n_samples=20_000):
+def new_trainer(layer, form="auto", n_samples=20_000):
     generator = np.random.default_rng(1)
     bins = generator.integers(0, 12, (n_samples, 2)).astype(np.int32)
     targets = generator.uniform(0, layer.n_units, (n_samples, 1))
@@ -103,7 +103,7 @@ def trainer_of(layer, form="auto", n_samples=20_000):
 @pytest.mark.parametrize("form", ["plain", "block"])
 def test_a_layer_refuses_other_threads_while_it_is_trained(form):
     layer = core.ParallelPerceptron(core_cells.code(), 200, seed=1)
-    trainer, other = trainer_of(layer, form), trainer_of(layer, form)
+    trainer, other = new_trainer(layer, form), new_trainer(layer, form)
     order = np.tile(np.arange(20_000, dtype=np.int32), 20)
     thread, outcome = in_thread(lambda: trainer.present(order))
     uses = [
@@ -116,7 +116,7 @@ def test_a_layer_refuses_other_threads_while_it_is_trained(form):
         lambda: core.PDeltaTrainer(layer, core_cells.BINS, [[1.0]] * 3),
     ]
     refuses(IN_USE, uses[0], error=RuntimeError)
-    order[:] = -(2**31)  # it works on a copy
+    order[:] = -(2**31)  # changes nothing: the trainer works on a copy
     for use in uses[1:]:
         assert_refused(use, thread)
     thread.join()
@@ -126,12 +126,12 @@ def test_a_layer_refuses_other_threads_while_it_is_trained(form):
 
 def test_a_layer_refuses_training_while_threads_read_it():
     layer = core.ParallelPerceptron(core_cells.code(), 4000, seed=1)
-    trainer = trainer_of(layer, "plain", 5)
+    trainer = new_trainer(layer, "plain", n_samples=5)
     bins = np.tile(np.array(core_cells.BINS, np.int32), (500_000, 1))
     expected = layer.counts(core_cells.BINS)
     reads = [in_thread(lambda: layer.counts(bins)) for _ in range(2)]
     refuses(IN_USE, trainer.present, [0], error=RuntimeError)
-    bins[:] = 2**31 - 1  # they read a copy
+    bins[:] = 2**31 - 1  # changes nothing: the threads read a copy
     np.testing.assert_array_equal(layer.counts(core_cells.BINS), expected)
     assert layer.weights.shape == (4000, 40)
     for thread, outcome in reads:

@@ -1,3 +1,5 @@
+"""Files appear whole or not at all: a partial file is written and then renamed."""
+
 import gzip
 import os
 import subprocess

@@ -112,8 +112,8 @@ def test_an_episode_is_truncated_after_50_decisions_and_needs_a_reset():
     refuses("reset", env.step, np.zeros(1, np.float32), error=RuntimeError)
 
 
-def tolerances(env, **reset):
-    """Reset: return the goal tolerance of the environment before it, and that of the episode."""
+def tolerances_around_reset(env, **reset):
+    """Reset; return the goal tolerance of the environment before it, and that of the episode."""
     before = env.goal_tolerance
     return before, env.reset(**reset)[1]["goal_tolerance"]
 
@@ -122,18 +122,18 @@ def test_a_reset_without_the_option_keeps_the_goal_tolerance():
     env = AcrobotSwingUpEnv()
     assert env.goal_tolerance == 1.0
     for reset in ({}, {"seed": 5}, {"options": {}}, {"seed": 5, "options": None}):
-        assert tolerances(env, **reset) == (1.0, 1.0)
+        assert tolerances_around_reset(env, **reset) == (1.0, 1.0)
     env = gym.make(ID, goal_tolerance=0.25).unwrapped
-    assert [tolerances(env) for _ in range(3)] == [(0.25, 0.25)] * 3
+    assert [tolerances_around_reset(env) for _ in range(3)] == [(0.25, 0.25)] * 3
 
 
 def test_a_goal_tolerance_holds_from_the_next_reset_on():
     env = AcrobotSwingUpEnv(goal_tolerance=0.5)
-    assert tolerances(env, options={"goal_tolerance": 0.01}) == (0.5, 0.01)
-    assert tolerances(env, seed=1) == (0.01, 0.01)
+    assert tolerances_around_reset(env, options={"goal_tolerance": 0.01}) == (0.5, 0.01)
+    assert tolerances_around_reset(env, seed=1) == (0.01, 0.01)
     env.goal_tolerance = 0.1
     assert env.step([0.0])[4]["goal_tolerance"] == 0.01, "the current episode keeps its tolerance"
-    assert tolerances(env) == (0.1, 0.1)
+    assert tolerances_around_reset(env) == (0.1, 0.1)
 
 
 def test_the_goal_tolerance_is_a_share_of_the_speed_limits():

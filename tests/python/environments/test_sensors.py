@@ -6,12 +6,7 @@ import pytest
 
 from refusals import refuses
 from sdnn import _core
-from sdnn.environments import (
-    AcrobotSwingUpEnv,
-    NoisySensors,
-    RedundantSensors,
-    SensorConfig,
-)
+from sdnn.environments import AcrobotSwingUpEnv, NoisySensors, RedundantSensors, SensorConfig
 
 
 def run(env, n_episodes=20):

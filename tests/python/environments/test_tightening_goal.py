@@ -87,9 +87,10 @@ def test_environments_of_a_vector_have_separate_goals():
         config=AcrobotConfig(max_decisions=1),
     )
     infos = envs.reset(options={"episode": 100})[1]
-    assert infos["goal_tolerance"].tolist() == [0.5, 0.5]
+    assert infos["goal_tolerance"].tolist() == [0.5, 0.5]  # 1 / (1 + 100 / 100)
     envs.set_attr("episode", [300, 1])
     still = np.zeros((2, 1), np.float32)
+    # Episodes have one step, so that the second step begins the episodes 300 and 1.
     assert envs.step(still)[4]["goal_tolerance"].tolist() == [0.5, 0.5]
     assert envs.step(still)[4]["goal_tolerance"].tolist() == [0.25, GoalSchedule()(1)]
 

@@ -7,11 +7,7 @@ from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 from refusals import refuses
 from sdnn import _core
-from sdnn.environments import (
-    AcrobotConfig,
-    AcrobotSwingUpVectorEnv,
-    GoalSchedule,
-)
+from sdnn.environments import AcrobotConfig, AcrobotSwingUpVectorEnv, GoalSchedule
 
 ID = "sdnn/AcrobotSwingUp-v0"
 EASY = AcrobotConfig(goal_height=0.5, max_decisions=12)
@@ -35,15 +31,15 @@ def assert_same(got, expected):
             assert_same(got[key], value)
     elif isinstance(expected, tuple):
         assert len(got) == len(expected)
-        for one, other in zip(got, expected, strict=True):
-            assert_same(one, other)
+        for item, expected_item in zip(got, expected, strict=True):
+            assert_same(item, expected_item)
     else:
         assert got.dtype == expected.dtype
         assert got.shape == expected.shape
         assert got.tobytes() == expected.tobytes()
 
 
-def pair(num_envs, **kwargs):
+def batched_and_sync(num_envs, **kwargs):
     return [
         gym.make_vec(ID, num_envs=num_envs, vectorization_mode=mode, **kwargs)
         for mode in ("vector_entry_point", "sync")
@@ -65,7 +61,7 @@ def test_make_vec_returns_the_batched_environment_with_the_spaces_of_a_sync_vect
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
 @pytest.mark.parametrize("num_envs", [1, 3, 8, 13])
 def test_a_batch_has_the_bits_of_single_environments(instruction_set, num_envs, dtype):
-    envs, sync = pair(num_envs, config=EASY, dtype=dtype)
+    envs, sync = batched_and_sync(num_envs, config=EASY, dtype=dtype)
     random = np.random.default_rng(num_envs)
     assert_same(envs.reset(seed=3), sync.reset(seed=3))
     n_terminated = n_truncated = 0
@@ -80,7 +76,7 @@ def test_a_batch_has_the_bits_of_single_environments(instruction_set, num_envs, 
 
 
 def test_resets_of_a_batch_equal_those_of_a_sync_vector():
-    envs, sync = pair(4, config=EASY)
+    envs, sync = batched_and_sync(4, config=EASY)
     random = np.random.default_rng(2)
     mask = np.array([True, False, True, False])
     resets = [
@@ -121,7 +117,7 @@ def test_a_goal_tolerance_holds_from_the_next_episode_of_each_environment():
     envs = AcrobotSwingUpVectorEnv(2, config=AcrobotConfig(max_decisions=2))
     envs.reset()
     envs.goal_tolerance = GoalSchedule()(300)
-    assert end_episodes(envs) == [0.25, 0.25]
+    assert end_episodes(envs) == [0.25, 0.25]  # 1 / (1 + 300 / 100), by the schedule
     envs.goal_tolerance = [0.1, 0.2]
     assert envs.step([[0.0], [0.0]])[4]["goal_tolerance"].tolist() == [0.25, 0.25]
     envs.goal_tolerance[0] = 7.0  # a copy
@@ -186,7 +182,7 @@ def test_gymnasiums_vector_wrappers_record_whole_episodes():
 
 def test_a_batch_renders_every_environment_or_warns_without_a_mode(monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    envs, sync = pair(2, render_mode="rgb_array")
+    envs, sync = batched_and_sync(2, render_mode="rgb_array")
     actions = np.array([[1.0], [-0.5]], np.float32)
     for each in (envs, sync):
         each.reset(seed=1)

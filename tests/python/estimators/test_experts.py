@@ -167,14 +167,14 @@ def test_learning_does_not_depend_on_predictions(river, experts):
     targets = [x["x0"] + math.sin(5 * x["x1"]) for x in rows]
     labels = ["low" if target < 0 else "high" for target in targets]
     for make, goals in ((regressor, targets), (classifier, labels)):
-        asked, silent = make(river, experts), make(river, experts)
+        predicting, silent = make(river, experts), make(river, experts)
         for x, y in zip(rows, goals, strict=True):
-            asked.predict_one(x)
-            asked.predict_one({**x, "x0": True})  # equals 1.0, but is not the learned sample
-            asked.learn_one(x, y)
+            predicting.predict_one(x)
+            predicting.predict_one({**x, "x0": True})  # equals 1.0, but is not the learned sample
+            predicting.learn_one(x, y)
             silent.learn_one(x, y)
-        assert asked.weights_ == silent.weights_
-        assert [asked.predict_one(x) for x in rows] == [silent.predict_one(x) for x in rows]
+        assert predicting.weights_ == silent.weights_
+        assert [predicting.predict_one(x) for x in rows] == [silent.predict_one(x) for x in rows]
 
 
 @pytest.mark.parametrize("experts", ["network", "linear", "window"])
@@ -251,9 +251,9 @@ def test_a_class_that_appears_late_is_predicted_also_with_single_units(river):
             model.learn_one(x, label)
             single.learn_one(x, label)
         order = np.random.RandomState(0).permutation(order)
-    for made in (model, single):
-        assert made.predict_one({**rows[0], "x0": 0.9}) == "high"
-        assert made.predict_one({**rows[0], "x0": -0.9}) == "low"
+    for classifier_ in (model, single):
+        assert classifier_.predict_one({**rows[0], "x0": 0.9}) == "high"
+        assert classifier_.predict_one({**rows[0], "x0": -0.9}) == "low"
 
 
 EXTREMES = [0.0, 1e300, -1e300, 1e-310, 1.7e308, -1.7e308, 5e-324, 1.0, None, 1e154, -1e-200]
@@ -286,6 +286,6 @@ def test_the_window_expert_has_smaller_errors_on_a_smooth_function(river):
     targets = [math.sin(3 * x["x0"]) * x["x1"] + x["x2"] ** 2 + x["x3"] for x in rows]
     model, linear = regressor(river, "window"), regressor(river)
     squares = [np.square(errors_of(made, rows, targets)[150:]).mean() for made in (model, linear)]
-    assert squares[0] < 0.7 * squares[1]
+    assert squares[0] < 0.7 * squares[1], "mean squared errors after the first 150 samples"
     assert set(model.weights_) == {"mean", "linear", "window", "network"}
     assert model.weights_["window"] > 0.5

@@ -139,10 +139,11 @@ def nested(depth):
         lambda description, arrays: description["codings"][0].update(n_bins=3),
         lambda description, arrays: description["codings"].insert(0, nested(800)),
     ],
+    ids=["two outputs", "counts", "shape", "two features", "few bins", "800 nested codings"],
 )
 def test_inconsistent_parts_of_a_file_are_refused_as_damage(change, tmp_path):
     path = tmp_path / "model.safetensors"
-    SDNNRegressor(**SMALL).fit(X, Y).save(path)
+    SDNNRegressor(**SMALL).fit(X, Y).save(path)  # three features and one output
     description, arrays = read_file(path, "estimator")
     change(description, arrays)
     write_file(path, "estimator", arrays, description)

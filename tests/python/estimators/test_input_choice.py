@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from refusals import refuses
 from sdnn import SDNNKernelClassifier, SDNNKernelRidge
 from sdnn.coding import Circular, RandomInverse
 from sdnn.coding.kernel import N_UNITS, AnalyticKernel
@@ -138,7 +137,7 @@ def test_importance_is_the_change_where_a_feature_is_averaged_away():
         for copy, value in zip(replaced, table[:, feature], strict=True):
             copy[:, feature] = value
         changes = outputs(table) - np.mean([outputs(copy) for copy in replaced], axis=0)
-        expected = np.square(changes).mean() / choice._variances[0]
+        expected = np.square(changes).mean() / choice._variances[0]  # a share of the variance
         np.testing.assert_allclose(importance, expected)
 
 
@@ -190,7 +189,3 @@ def test_the_description_names_features_and_weights():
     assert lines[:5] == ["4 of 4 features", "left", "right", "up", "down"]
     assert lines[5].startswith("direction 0: +1.00 ")
     assert all(name in lines[5] for name in X)
-
-
-def test_unknown_values_of_the_parameter_inputs_are_refused():
-    refuses("inputs", SDNNKernelRidge(inputs="some").fit, uniform(9, 2), np.arange(9.0))

@@ -22,7 +22,8 @@ def covered(bounds, y):
 
 
 def test_the_bound_is_the_error_of_the_rank_that_coverage_needs():
-    # Nine errors: a new one exceeds at most k - 1 of them with probability k / 10.
+    # Among nine errors, a new one is at most the k-th smallest with probability k / 10: coverage
+    # 0.75 needs k = 8. The errors are 1 to 9, so that the k-th smallest is k.
     sizes = np.array([[5.0], [1.0], [9.0], [3.0], [7.0], [2.0], [8.0], [4.0], [6.0]])
     for coverage, bound in ((0.1, 1.0), (0.5, 5.0), (0.75, 8.0), (0.9, 9.0)):
         assert error_bounds(sizes, np.ones(9), coverage).tolist() == [bound]

@@ -27,7 +27,7 @@ SETTINGS = {"coding": UNIT, "n_pattern_units": 128, "random_state": 3}
 REGRESSOR = {**SETTINGS, "output_range": (-1.5, 1.5), "n_output_units": 60}
 
 
-def same(model, expected):
+def assert_equal_weights(model, expected):
     np.testing.assert_array_equal(model.weights_, expected.weights_)
     np.testing.assert_array_equal(model.thresholds_, expected.thresholds_)
 
@@ -66,11 +66,13 @@ def test_partial_fit_in_any_portions_equals_one_epoch_of_fit(portions, regressio
         classes = np.arange(3)
         whole = SDNNClassifier(**SETTINGS).partial_fit(X[:n], y, classes=classes)
         if n >= 3:
-            same(whole, SDNNClassifier(**SETTINGS, max_iter=1, shuffle=False).fit(X[:n], y))
+            assert_equal_weights(
+                whole, SDNNClassifier(**SETTINGS, max_iter=1, shuffle=False).fit(X[:n], y)
+            )
         parts = SDNNClassifier(**SETTINGS)
         for a, b in itertools.pairwise(bounds):
             parts.partial_fit(X[a:b], y[a:b], classes=classes)
-    same(whole, parts)
+    assert_equal_weights(whole, parts)
     assert parts.n_iter_ == len(portions)
 
 
@@ -80,9 +82,9 @@ def test_epochs_of_fit_equal_passes_of_partial_fit():
     for _ in range(4):
         for x, y in zip(X, Y, strict=True):
             online.partial_fit([x], [y])
-    same(fitted, online)
+    assert_equal_weights(fitted, online)
     online.partial_fit(X, Y)
-    same(SDNNRegressor(**REGRESSOR, max_iter=5, shuffle=False).fit(X, Y), online)
+    assert_equal_weights(SDNNRegressor(**REGRESSOR, max_iter=5, shuffle=False).fit(X, Y), online)
 
 
 both_estimators = pytest.mark.parametrize(
@@ -96,7 +98,7 @@ def test_a_warm_start_of_3_after_2_epochs_equals_5_epochs(estimator, options, ta
     model = estimator(**options, shuffle=False, warm_start=True, max_iter=2).fit(X, targets)
     first, weights = model.network_, model.weights_
     assert model.set_params(max_iter=3).fit(X, targets).n_iter_ == 3
-    same(model, estimator(**options, shuffle=False, max_iter=5).fit(X, targets))
+    assert_equal_weights(model, estimator(**options, shuffle=False, max_iter=5).fit(X, targets))
     np.testing.assert_array_equal(first.layer.weights, weights)
 
 
@@ -163,7 +165,7 @@ def test_several_outputs_are_learned_independently():
 def test_a_target_of_one_column_is_learned_like_a_vector_and_keeps_its_shape():
     column = SDNNRegressor(**REGRESSOR, max_iter=2).fit(X, Y[:, None])
     assert column.predict(X).shape == (150, 1)
-    same(column, SDNNRegressor(**REGRESSOR, max_iter=2).fit(X, Y))
+    assert_equal_weights(column, SDNNRegressor(**REGRESSOR, max_iter=2).fit(X, Y))
 
 
 def test_predictions_are_multiples_of_a_step_within_the_output_range():
@@ -188,7 +190,7 @@ def test_early_stopping_restores_the_weights_of_the_best_epoch(estimator):
     best = int(np.argmax(model.validation_scores_))
     assert model.n_iter_ == len(model.validation_scores_) <= 60
     again = estimator(**options, early_stopping=True, n_iter_no_change=4, max_iter=best + 1)
-    same(model, again.fit(X, targets))
+    assert_equal_weights(model, again.fit(X, targets))
     refuses("early", estimator(early_stopping=True, validation_fraction=0.9).fit, X[:2], [0, 1])
 
 
@@ -272,7 +274,7 @@ def test_class_weights_are_numbers_of_presentations():
     by_hand.partial_fit(np.repeat(X, 1 + 2 * rare, axis=0), np.repeat(rare, 1 + 2 * rare), [0, 1])
     for _ in range(weighted.n_iter_ - 1):
         by_hand.partial_fit(np.repeat(X, 1 + 2 * rare, axis=0), np.repeat(rare, 1 + 2 * rare))
-    same(weighted, by_hand)
+    assert_equal_weights(weighted, by_hand)
 
 
 def test_balanced_class_weights_predict_the_rare_class_more_often():
@@ -299,11 +301,11 @@ def test_integer_sample_weights_equal_repeated_samples(make):
     times = np.arange(len(Y)) % 3
     targets = Y if make is SDNNRegressor else LABELS
     plain = make(**SETTINGS, max_iter=3).fit(X, targets)
-    same(plain, make(**SETTINGS, max_iter=3).fit(X, targets, np.ones(len(Y))))
+    assert_equal_weights(plain, make(**SETTINGS, max_iter=3).fit(X, targets, np.ones(len(Y))))
     options = SETTINGS | ({"output_range": (-10, 10)} if make is SDNNRegressor else {})
     weighted = make(**options, max_iter=3).fit(X, targets, times)
     repeated = make(**options, max_iter=3).fit(X.repeat(times, 0), targets.repeat(times))
-    same(weighted, repeated)
+    assert_equal_weights(weighted, repeated)
     assert (weighted.weights_ != plain.weights_).any()
 
 
@@ -312,7 +314,9 @@ def test_sample_weights_are_scaled_to_a_mean_of_one(make):
     targets = Y if make is SDNNRegressor else LABELS
     weights = RANDOM.uniform(0.5, 1.5, len(Y))
     model = make(**SETTINGS, max_iter=3).fit(X, targets, weights / weights.sum())
-    same(model, make(**SETTINGS, max_iter=3).fit(X, targets, weights / weights.mean()))
+    assert_equal_weights(
+        model, make(**SETTINGS, max_iter=3).fit(X, targets, weights / weights.mean())
+    )
 
 
 def test_adaboost_boosts_classifiers_by_sample_weights():
@@ -325,7 +329,7 @@ def test_sample_and_class_weights_are_multiplied():
     labels = (Y > 0).astype(int)
     both = SDNNClassifier(**options, class_weight={0: 2, 1: 1}).fit(X, labels, np.full(len(Y), 0.5))
     products = np.where(labels == 0, 2 * 0.5, 1 * 0.5)
-    same(both, SDNNClassifier(**options).fit(X, labels, products))
+    assert_equal_weights(both, SDNNClassifier(**options).fit(X, labels, products))
 
 
 def test_sample_weights_apply_to_early_stopping_and_selection_of_pairs():
@@ -387,7 +391,7 @@ def test_predictions_average_the_networks_of_three_epochs(tmp_path):
     model.learn_one(X[0], Y[0])
     assert model.predict(X, return_std=True)[1].max() == 0
     plain = SDNNRegressor(**options, max_iter=11).fit(X, noisy)
-    same(plain.learn_one(X[0], Y[0]), model)
+    assert_equal_weights(plain.learn_one(X[0], Y[0]), model)
 
 
 def test_averaged_networks_count_towards_the_memory_limit():

@@ -40,7 +40,7 @@ def classifier(**options):
     return SDNNClassifier(**{"coding": UNIT, **OPTIONS, **options})
 
 
-def same(model, expected):
+def assert_equal_weights(model, expected):
     np.testing.assert_array_equal(model.weights_, expected.weights_)
     np.testing.assert_array_equal(model.thresholds_, expected.thresholds_)
     assert model.n_iter_ == expected.n_iter_
@@ -52,7 +52,7 @@ def test_learn_one_and_predict_one_have_the_bits_of_partial_fit_and_predict(name
     for row, x, y in zip(ROWS, X, Y, strict=True):
         model.learn_one(row if named else x, y)
         plain.partial_fit(x[None], [y])
-    same(model, plain)
+    assert_equal_weights(model, plain)
     frame = pd.DataFrame(X, columns=NAMES) if named else X
     singly = [model.predict_one(row if named else x) for row, x in zip(ROWS, X, strict=True)]
     np.testing.assert_array_equal(singly, model.predict(frame))
@@ -80,14 +80,16 @@ def test_learn_one_of_labels_has_the_bits_of_partial_fit(scheme):
     for x, label in zip(X, LABELS, strict=True):
         model.learn_one(x, label, classes=[0, 1, 2])
         block.partial_fit(x[None], [label], classes=[0, 1, 2])
-    same(model, block)
+    assert_equal_weights(model, block)
     assert [model.predict_one(x) for x in X] == model.predict(X).tolist()
 
 
 def test_fit_widens_the_output_range_before_training_and_partial_fit_during_it():
     options = {"max_iter": 1, "shuffle": False, "out_of_range": "widen"}
     within, beyond = Y.copy(), np.where(np.arange(len(Y)) == 99, 4.0, Y)
-    same(regressor(**options).fit(X, within), regressor(**options).partial_fit(X, within))
+    assert_equal_weights(
+        regressor(**options).fit(X, within), regressor(**options).partial_fit(X, within)
+    )
     fitted, partly_fitted = (regressor(**options) for _ in range(2))
     for learn in (fitted.fit, partly_fitted.partial_fit):
         with pytest.warns(OutOfRangeWarning):
@@ -107,7 +109,7 @@ def test_portions_of_any_size_have_the_bits_of_plain_training():
         np.testing.assert_array_equal(model.predict(X[:2]), plain.predict(X[:2]))
         model = pickle.loads(pickle.dumps(model)) if size == 3 else copy.deepcopy(model)
         begin += size
-    same(model, plain)
+    assert_equal_weights(model, plain)
 
 
 @pytest.mark.parametrize("learns", [False, True])
@@ -137,7 +139,7 @@ def test_features_that_may_be_missing_may_be_left_out():
     lacking = {name: value for name, value in rows[3].items() if name not in ("b", "word")}
     assert model.predict_one(lacking) == model.predict_one(rows[3])
     copied = copy.deepcopy(model)
-    same(model.learn_one(lacking, 0.5), copied.learn_one(rows[3], 0.5))
+    assert_equal_weights(model.learn_one(lacking, 0.5), copied.learn_one(rows[3], 0.5))
     for bad in ({**lacking, "e": 1.0}, {"b": 0.5, "word": "u"}, {**lacking, "word": "u", "e": 1.0}):
         refuses("word", model.predict_one, bad)
 
@@ -159,7 +161,7 @@ def test_learn_one_and_predict_one_code_inputs_like_fit_and_predict():
     model = regressor(coding=words).fit(table, Y)
     assert [model.predict_one(x) for x in table] == model.predict(table).tolist()
     plain = pickle.loads(pickle.dumps(model)).set_params(training="plain")
-    same(model.learn_one(list(table[0]), Y[0]), plain.partial_fit(table[:1], Y[:1]))
+    assert_equal_weights(model.learn_one(list(table[0]), Y[0]), plain.partial_fit(table[:1], Y[:1]))
     refuses("categories", model.predict_one, [0.1, 0.2, "w"])
 
 
@@ -180,7 +182,7 @@ def test_weights_beyond_16_bits_are_learned_online():
         thresholds=model.thresholds_,
     )
     other = pickle.loads(pickle.dumps(model)).set_params(training="plain")
-    same(model.learn_one(X[0], Y[0]), other.partial_fit(X[:1], Y[:1]))
+    assert_equal_weights(model.learn_one(X[0], Y[0]), other.partial_fit(X[:1], Y[:1]))
     assert network.online(2**30) is None
 
 
@@ -339,7 +341,7 @@ def test_river_estimators_refuse_a_bad_sample_and_keep_learning(river, number, n
     for row, target in zip(ROWS[n_before:60], targets[n_before:], strict=False):
         model.learn_one(row, target)
         without_refusals.learn_one(row, target)
-    same(model.fitted, without_refusals.fitted)
+    assert_equal_weights(model.fitted, without_refusals.fitted)
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -399,7 +401,7 @@ def test_adding_inputs_keeps_predictions_and_can_be_saved(river, tmp_path):
     assert [model.fitted.predict_one(x) for x in rows] == before
     model.fitted.learn_one({"new": 0.5, "word": "w"}, 0.5)
     model.fitted.save(tmp_path / "grown.safetensors")
-    same(SDNNRegressor.load(tmp_path / "grown.safetensors"), model.fitted)
+    assert_equal_weights(SDNNRegressor.load(tmp_path / "grown.safetensors"), model.fitted)
 
 
 def test_before_fitting_the_first_of_equally_frequent_labels_is_predicted(river):

@@ -214,11 +214,8 @@ def test_pipelines_cross_validation_and_grid_search_accept_the_estimators(estima
         search.best_params_["coding__length_scale"]
     }
     refuses("length", estimator.set_params, coding__length=0.1)
-    refuses(
-        "coding",
-        estimator.set_params(coding=[("anchor", [0])]).set_params,
-        coding__length_scale=0.1,
-    )
+    listed = estimator.set_params(coding=[("anchor", [0])])
+    refuses("coding", listed.set_params, coding__length_scale=0.1)
 
 
 def test_verbose_prints_progress(estimator, capsys):
