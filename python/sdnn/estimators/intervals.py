@@ -58,7 +58,10 @@ def error_bounds(sizes: Floats, counts: Floats, coverage: float) -> Floats:
 
 
 def log_sizes(errors: Floats) -> Floats:
-    """Return logarithms of the sizes of errors, as targets of a model; shape as `errors`."""
+    """Return logarithms of the sizes of errors, as targets of a model; shape as `errors`.
+
+    Each is at least `LEAST_SHARE` of their root mean square: an error of 0 has no logarithm.
+    """
     sizes = np.abs(errors)
     unit = sizes.max(axis=0)
     unit[unit == 0.0] = 1.0

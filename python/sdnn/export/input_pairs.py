@@ -54,11 +54,15 @@ class PairTables:
         self.rows = [self._row(pair, modified) for pair in range(len(code.pairs))]
 
     def _row(self, pair: int, modified: dict[int, Patterns]) -> str:
-        """Return the fields of a pair's struct in C."""
+        """Return the fields of a pair's struct in C: inputs, tables, first index of an order.
+
+        A modifying table that is the input's modified table with its units in another order is
+        stored as that order, if this is shorter.
+        """
         mu, nu = self.code.core_pairs[pair].tolist()
         table = self._place(self.code.modified[pair])
         modifier = self.code.modifiers[pair]
-        if (modifier > 0).all():
+        if (modifier > 0).all():  # an input alone: its pattern is not modified
             return f"{{{mu}, {nu}, {table}, {_NONE}, {_NONE}}},"
         base = modified.get(self.code.pairs[pair][1])
         is_shorter = self.m * self.order_bytes < len(modifier) * self.row_bytes

@@ -330,9 +330,9 @@ class TenTrials:
             [np.median(values[drawn], axis=-1) for drawn in self._draws(subject)]
             for subject, values in samples
         ]
-        return tuple(
-            check.contains(reduce(np.subtract, kind)) for kind in zip(*medians, strict=True)
-        )
+        # By kind of draw: the median, or the difference of the medians of two subjects.
+        quantities = [reduce(np.subtract, by_subject) for by_subject in zip(*medians, strict=True)]
+        return tuple(map(check.contains, quantities))
 
 
 # Reference results: more trials than a run of the paper's ten, on other seeds. They were run by

@@ -123,15 +123,14 @@ def advice(
     'did you mean budget.steps? possible: seed'
     """
     known = tuple(possible)
-    # Names by similarity: a low cutoff for the order of the list, a high one for a suggestion.
     word = name.strip("-").replace("-", "_").lower()
     meanings = (word, *HABITS.get(word, ()))
-    near = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
+    near = difflib.get_close_matches(name, known, n=3, cutoff=0.5)  # listed first
     near = [meaning for meaning in meanings if meaning in known] + near
     hints = [meaning for meaning in meanings if meaning in known]
     hints += [elsewhere[meaning] for meaning in meanings if meaning in elsewhere]
     sentence = next((meaning for meaning in meanings if " " in meaning), "")
-    if not sentence:
+    if not sentence:  # a suggestion must be more alike
         hints += difflib.get_close_matches(name, known, n=1, cutoff=0.7)
         hints += map(elsewhere.__getitem__, difflib.get_close_matches(name, elsewhere, 1, 0.8))
     hint = f"did you mean {hints[0]}? " if hints else f"{sentence}; " if sentence else ""

@@ -262,7 +262,7 @@ class Episodes:
         self._store_first_observations(first_observations)
         for i in first_observations:
             self._learner.begin_episode(i)
-        self._begins_with_step = numbers
+        self._begins_with_step = numbers  # those without a first observation yet
         self.unlearned = [i for i in self._environments if present[i] is not None]
 
     def step(self, actions: Elements) -> None:
