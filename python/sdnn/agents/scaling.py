@@ -58,7 +58,7 @@ class Scaling:
 
     def words(self) -> str:
         """Describe the scaling in a line."""
-        most = 8
+        most = 8  # ranges that have room in a line
         ranges = [f"{i} from {low:.6g} to {high:.6g}" for i, (low, high) in enumerate(self.ranges)]
         text = ", ".join(ranges[:most]) + (", ..." if len(ranges) > most else "")
         return text + (f", and means of neighbours ({self.n_redundant})" * (self.n_redundant > 0))

@@ -181,7 +181,7 @@ class AcrobotSwingUpEnv(gym.Env[Array, ArrayLike]):
         return self._draw(self.state, self._success)
 
     def _show(self, states: Iterable[NDArray[np.float64]]) -> None:
-        """Draw states and the current one, and keep the pictures for `render`."""
+        """Draw states between two decisions, then the current one; keep the pictures."""
         pictures = [self._draw(state, solved=False) for state in states]
         pictures.append(self._draw(self.state, self._success))
         self._pictures += [picture for picture in pictures if picture is not None]

@@ -73,18 +73,18 @@ def sample_weights(
     if weights is None:
         return None
     try:
-        each = np.array(weights, dtype=np.float64)
+        checked = np.array(weights, dtype=np.float64)
     except (TypeError, ValueError):
-        each = np.array(np.nan)  # refused below, as no number in the range
-    each = np.full(n_samples, each) if each.ndim == 0 else each
-    fits = each.shape == (n_samples,) and np.all((each >= 0) & (each <= LARGEST_WEIGHT))
+        checked = np.array(np.nan)  # refused below, as no number in the range
+    checked = np.full(n_samples, checked) if checked.ndim == 0 else checked
+    fits = checked.shape == (n_samples,) and np.all((checked >= 0) & (checked <= LARGEST_WEIGHT))
     expected = f"be a number in [0, {LARGEST_WEIGHT}] for each of {n_samples} samples"
     require(fits, name, expected, weights)
-    if not each.any():
+    if not checked.any():
         raise ValueError(f"{name} must be above zero for some sample, got zero for all")
-    if each.sum() > MOST_PRESENTED:
-        raise ValueError(f"{name} must sum to at most {MOST_PRESENTED}, got {each.sum():.4g}")
-    return each
+    if checked.sum() > MOST_PRESENTED:
+        raise ValueError(f"{name} must sum to at most {MOST_PRESENTED}, got {checked.sum():.4g}")
+    return checked
 
 
 def held_out_fifth(labels: Array, is_stratified: bool, seed: int) -> NDArray[np.bool_]:

@@ -91,6 +91,7 @@ class LibsdnnParameters:
         if self.pattern_seed is None:
             raise ValueError("random_seed of PC must be a list of numbers, got hardware_entropy")
         n_tables = 2 * len(self.pairs)
+        # Drawing a pattern takes as long as its flips, or as copying its units.
         for coded in {self.inputs[index] for pair in self.pairs for index in pair}:
             if n_tables * coded.n_bins * max(coded.n_flipped, self.n_units // 64) > MOST_DRAWN:
                 raise ValueError(

@@ -314,7 +314,7 @@ def study_json(comparison: Comparison, digest: str, addition: Addition) -> dict[
             }
             for (case, variant), m in comparison.measured.items()
         ],
-        **addition[1],
+        **addition[1],  # what the study's report adds, such as the paper's claims
     }
 
 
