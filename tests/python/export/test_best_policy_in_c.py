@@ -5,15 +5,7 @@ import pytest
 
 from c_histories import actor_observer, differences
 from c_keeping import check_best, compiled
-from c_learners import (
-    actor,
-    actor_vector,
-    discrete,
-    network,
-    paper_rule,
-    sarsa,
-    several,
-)
+from c_learners import actor, actor_vector, discrete, network, paper_rule, sarsa, several
 from c_policies import SANITIZED, run
 from sdnn.training.files import EpisodeBlock
 
@@ -64,9 +56,9 @@ static void begin(uint32_t length) {
 static void keep(int64_t score) { printf("%d", agent_keep(&agent, &keeper, score)); }
 int main(void) {
   agent_begin(&agent);
-  begin(2), keep(100), keep(100);
-  begin(1), keep(150), keep(140);
-  begin(1), keep(140), keep(160);
+  begin(2), keep(100), keep(100); /* prints 0: no policy was kept; 0, 1: the block ends, the best */
+  begin(1), keep(150), keep(140); /* 1: another length; 1: the first of its length; 0: no better */
+  begin(1), keep(140), keep(160); /* 1: a policy was kept; 0: below 150; 1: above it */
   return 0;
 }
 """
@@ -74,22 +66,16 @@ int main(void) {
 
 def test_the_first_block_replaces_a_policy_of_blocks_of_another_length(target, tmp_path):
     program = compiled(OTHER_LENGTH, sarsa(), tmp_path, target, *SANITIZED)
-    assert run(*program).decode() == " 001 110 101"
+    assert run(*program).decode() == " 001 110 101"  # see the comments in the program
 
 
-@pytest.mark.parametrize(
-    "make",
-    [
-        discrete,
-        sarsa,
-        several,
-        network,
-        paper_rule,
-        actor,
-        actor_vector,
-        differences,
-        actor_observer,
-    ],
-)
+MAKERS = [
+    discrete, sarsa, several, network, paper_rule, actor, actor_vector, differences, actor_observer,
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("make", MAKERS, ids=lambda make: make.__name__)
 def test_the_kept_policy_acts_as_the_agent_did_when_it_was_kept(make, target, tmp_path):
+    # A C program keeps the policy, learns 900 steps more, and asks the kept policy for actions:
+    # they must be those of a Python agent that has not learned these steps.
     check_best(make, target, tmp_path, *SANITIZED)

@@ -17,7 +17,6 @@ from c_policies import (
     SMALL,
     STRICT,
     STRICT_CPP,
-    TARGETS,
     agents,
     box,
     check_all_actions,
@@ -50,14 +49,10 @@ from sdnn.export.text import weight_words
 Discrete = gym.spaces.Discrete
 
 
-@pytest.fixture
-def target(needs):
-    needs(TARGETS["x86-64"].compiler)
-    return TARGETS["x86-64"]
-
-
 @pytest.mark.parametrize("name", AGENTS)
 def test_actions_of_the_c_header_are_those_of_the_agent(name, target, tmp_path):
+    # A compiled program answers observations in fixed point, double and float; its actions must be
+    # the greedy ones of the Python agent.
     check_all_actions(name, target, tmp_path)
 
 
@@ -66,7 +61,7 @@ def test_actions_of_the_c_header_are_those_of_the_agent(name, target, tmp_path):
     [(1.0, 0.25, 2**21), (1.0, 2.0**-24, 0), (1e-30, 0.0, 0), (1e-30, 1.0, 2**62)],
 )
 def test_tie_tolerance_is_exported_in_integer_units_of_values(reward, tie_tolerance, expected):
-    # The value 1 is a sum of two weights of 23 bits: its unit is 2^-23.
+    # The value 1 is a sum of two weights of 23 bits: its unit is 2^-23, and 0.25 is 2^21 units.
     rule = QLambdaConfig(tie_rule="lowest", tie_tolerance=tie_tolerance)
     agent = SDNNQLambda(Discrete(2), Discrete(2), learning=rule)
     agent.learn(Transition(0, 1, reward, 1, terminated=True))
@@ -109,12 +104,14 @@ def test_greedy_actions_between_those_of_a_box_are_those_of_the_agent(name, targ
 
 
 def test_discrete_observations_are_exported_as_one_hot_inputs(target, tmp_path):
+    # A program receives 1,000 observations as 0s and 1s, and must answer as the Python agent.
     check_symbols(target, tmp_path)
 
 
 @pytest.mark.parametrize("name", ["pairs", "several"])
 def test_the_integer_path_needs_no_library_and_no_floating_point(name, target, needs, tmp_path):
     needs("nm", "objdump")
+    # It is compiled without floating-point instructions, and its object file is disassembled.
     check_integer_path(name, target, tmp_path)
 
 
@@ -154,7 +151,8 @@ def test_angles_have_the_bins_of_the_agent_at_every_boundary(needs, tmp_path):
 
 def test_nan_and_infinity_have_defined_bins(needs, tmp_path):
     # NaN counts as the lowest value, an angle of NaN or infinity as 0. The sanitizer would report
-    # conversions of NaN.
+    # conversions of NaN. Inputs of "pairs" are the angle of (x, y) = (cosine, sine) and a speed in
+    # -8 to 8, with 5 * 9 = 45 bins each.
     caught = ("-fsanitize=undefined,float-cast-overflow", "-fno-sanitize-recover=all")
     needs("clang", options=caught)
     for name, agent in (("pairs", agents()["pairs"]), ("symbols", symbols_agent())):
@@ -182,8 +180,9 @@ def test_nan_and_infinity_have_defined_bins(needs, tmp_path):
     bins_in_c = np.array(run(bins, input=text.encode()).split(), int).reshape(-1, 3)
     for (x, y, z), (angle, speed, symbol) in zip(points, bins_in_c.tolist(), strict=True):
         finite = math.isfinite(x) and math.isfinite(y)
-        assert angle == (5 * 9 * 5 // 8 if finite else 5 * 9 // 2)  # an eighth of a turn beyond 0
-        assert speed == {-math.inf: 0, 0.5: 5 * 9 * 8.5 // 16, math.inf: 44}.get(z, 0)
+        # Angles begin at half a turn before 0: 0 is at 1/2 of the bins, (0.5, 0.5) at 1/2 + 1/8.
+        assert angle == (45 * 5 // 8 if finite else 45 // 2)
+        assert speed == {-math.inf: 0, 0.5: 45 * (0.5 + 8) // 16, math.inf: 44}.get(z, 0)
         known = [number for number in (x, y, z) if not math.isnan(number)]
         assert not known or (x, y, z)[symbol] == max(known)
 
@@ -253,7 +252,7 @@ def test_the_c_example_balances_as_long_as_the_agent(needs, tmp_path):
     run("gcc", *options, main, "-o", tmp_path / "main", "-lm")
     n_steps = int(run(tmp_path / "main"))
     assert n_steps == balance(agent, 2.0**header.fraction_bits)
-    assert n_steps > 40  # at random it falls after 20
+    assert n_steps > 40, "with random actions it falls after about 20 steps"
 
 
 def test_tables_of_actions_are_those_of_the_agent():

@@ -29,6 +29,7 @@ from sdnn.export import c_header, load_image, save_image
 @pytest.mark.parametrize("kind", ["int32_t", "double", "float"])
 @pytest.mark.parametrize("name", POLICIES)
 def test_greedy_actions_with_a_history_are_those_of_the_agent(name, kind, target, tmp_path):
+    # A compiled program and the Python agent act for the same observations of several episodes.
     check_policy(name, kind, target, tmp_path)
 
 

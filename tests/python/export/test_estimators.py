@@ -48,11 +48,13 @@ int main(void) {
 
 @pytest.mark.parametrize("name", ESTIMATORS)
 def test_predictions_in_c_have_the_bits_of_the_estimator(name, target, tmp_path):
+    # A compiled program predicts 300 samples; its doubles must equal those of `model.predict`.
     check_predictions(name, target, tmp_path, 300, *SANITIZED)
 
 
 @pytest.mark.parametrize("name", ESTIMATORS)
 def test_learning_in_c_has_the_bits_of_the_estimator(name, target, tmp_path):
+    # A program and `model.learn_one` learn 150 samples; weights and predictions must stay equal.
     check_learning(name, target, tmp_path, 150, *SANITIZED)
 
 
@@ -211,11 +213,11 @@ def test_small_settings_fit_a_small_processor(n_inputs, groups):
 def test_small_settings_score_like_the_default():
     X, y = make_friedman1(700, 5, noise=1.0, random_state=3)
     y -= 5 * X[:, 4]
-    fit, held = np.split(np.arange(700), [500])
+    fit, held_out = np.split(np.arange(700), [500])
     scores = [
         SDNNRegressor(**settings, random_state=0)
         .fit(X[fit, :4], y[fit])
-        .score(X[held, :4], y[held])
+        .score(X[held_out, :4], y[held_out])
         for settings in ({}, small_settings(4))
     ]
     assert scores[1] > scores[0] - 0.03

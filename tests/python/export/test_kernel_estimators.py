@@ -15,6 +15,7 @@ from sdnn.export import estimator_header
 
 @pytest.mark.parametrize("name", KERNEL_ESTIMATORS)
 def test_outputs_in_c_are_sums_in_the_order_of_the_samples(name, target, tmp_path):
+    # A compiled program predicts 100 samples; NumPy adds the same terms one after the other.
     check_kernel(name, target, tmp_path, 100, *SANITIZED)
 
 

@@ -46,6 +46,8 @@ SANITIZED = ("-fsanitize=undefined", "-fno-sanitize-recover=all")
 
 @pytest.mark.parametrize("name", LEARNERS)
 def test_an_exported_agent_acts_and_learns_bit_for_bit_as_in_python(name, target, tmp_path):
+    # A compiled program and the Python agent act and learn 3,000 steps; their actions and their
+    # saved images must be equal, from a new agent and from an image.
     check_learning(name, target, tmp_path, options=SANITIZED)
 
 
@@ -169,9 +171,9 @@ def test_images_with_extreme_numbers_are_refused_or_saved_again(make, target, tm
         if random.random() < 0.3:  # weights
             most = [b"\xff\xff\x7f\x00", b"\x01\x00\x80\xff"]
             weights = [b"\xff", b"\x01"] if isinstance(agent, SDNNQLearning) else most
-            one = weights[random.integers(2)]
+            weight = weights[random.integers(2)]
             half = len(image) // 8 * 4
-            image[-4 - half : -4] = one * (half // len(one))
+            image[-4 - half : -4] = weight * (half // len(weight))
         image[-4:] = zlib.crc32(image[:-4]).to_bytes(4, "little")
         images.append(bytes(image))
     n_loaded = int(run(hostile, input=b"".join(images)))
@@ -181,12 +183,9 @@ def test_images_with_extreme_numbers_are_refused_or_saved_again(make, target, tm
 def test_weights_that_leave_their_range_are_halved(target, tmp_path):
     # From the largest weights, a step leads to 2^24 - 1, which doubles the unit.
     learning = QLambdaConfig(
-        schedule_steps=0,
-        final_learning_rate=None,
-        traces="replacing",
-        epsilon=0.0,
+        schedule_steps=0, final_learning_rate=None, traces="replacing", epsilon=0.0,
         tie_rule="lowest",
-    )
+    )  # fmt: skip
     agent = SDNNQLambda(gym.spaces.Discrete(9), gym.spaces.Discrete(4), learning=learning)
     state = agent._state_of("agent")
     state["action_value.weights"][:] = 2**23 - 1
@@ -194,7 +193,7 @@ def test_weights_that_leave_their_range_are_halved(target, tmp_path):
     agent._restore(agent=state)
     header, command = build(tmp_path, agent, target, *SANITIZED)
     values = [round(agent.q_values(symbol)[0] * 2.0**10) for symbol in range(9)]
-    symbol, value = min(enumerate(values), key=lambda one: one[1])
+    symbol, value = min(enumerate(values), key=lambda pair: pair[1])
     assert value == -2 * (2**23 - 1)  # both of its inputs are -1 in the code
     now, reward = np.eye(9, dtype="<i4")[symbol], 2 * value << header.fraction_bits - 10
     lines = np.concatenate([[0], now, [0], now, [0], [1], now, [reward], now, [1]], dtype="<i4")
@@ -269,7 +268,7 @@ def test_constants_become_fixed_point_at_compile_time(target, tmp_path):
         (actor_vector, "uint32_t a[2]; one.act(x, a)"),
     ],
 )
-def test_cpp_can_learn_save_and_load_by_the_learner_class(compiler, make, act, needs, tmp_path):
+def test_the_learner_class_of_cpp_acts_learns_saves_and_loads(compiler, make, act, needs, tmp_path):
     needs(compiler)
     agent = make()
     (tmp_path / "agent.h").write_text(c_header(agent, "agent", learning=True).text)
@@ -353,7 +352,7 @@ def test_an_image_of_a_linear_agent_with_impossible_numbers_is_refused():
         refuses("image", load_image, agent, bytes(forged))
     states = agent._state_of("agent"), same._state_of("agent")
     assert all(np.array_equal(states[0][name], states[1][name]) for name in states[1])
-    # Another life in between leaves nothing behind.
+    # An image of a new agent replaces everything that was learned.
     new = discrete()
     load_image(agent, save_image(new))
     actions = run_agent(agent, lines, 16)

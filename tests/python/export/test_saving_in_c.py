@@ -112,7 +112,8 @@ def test_a_load_that_fails_leaves_the_agent_or_begins_a_new_one(make, target, tm
 
 @pytest.mark.parametrize("make", [states, sarsa, network, small_steps, actor_vector])
 def test_a_cut_of_the_power_leaves_the_old_or_the_new_state(make, target, tmp_path):
-    # Six stores, each cut off after every 61st byte.
+    # Six stores, each cut off after every 61st byte. Faults are states that are lost, wrong or not
+    # stored, and writes that flash memory does not allow.
     n_cuts, *faults = cut_power(make, tmp_path, target, 6, 61, *SANITIZED)
     assert n_cuts > 60
     assert faults == [0, 0, 0, 0]
@@ -121,7 +122,7 @@ def test_a_cut_of_the_power_leaves_the_old_or_the_new_state(make, target, tmp_pa
 @pytest.mark.slow
 @pytest.mark.parametrize("make", [states, sarsa, network, actor_vector])
 def test_no_cut_of_the_power_at_any_byte_loses_a_state(make, target, tmp_path):
-    image_bytes = len(save_image(make()))
+    image_bytes = len(save_image(make()))  # a cut at each byte, and at least 20,000 cuts
     n_cuts, *faults = cut_power(make, tmp_path, target, 25_000 // image_bytes + 1, 1)
     assert n_cuts >= 20_000
     assert faults == [0, 0, 0, 0]
@@ -165,7 +166,8 @@ int main(void) {
 
 
 def test_memory_that_is_overwritten_needs_no_erasing(target, tmp_path):
-    # The new state counts as soon as the 16 bytes of its record are written, of the last part.
+    # Power is cut after 0 to 64 bytes of the last part: the new state counts from the 16 bytes of
+    # its record on, in 64 - 16 + 1 cases.
     overwritten = compiled(OVERWRITTEN, sarsa(), tmp_path, target, *SANITIZED)
     assert int(run(*overwritten)) == 64 - 16 + 1
 

@@ -106,11 +106,11 @@ def test_the_model_file_of_a_classifier_is_read_with_libsdnns_weights(name, expe
 
 
 def test_values_have_the_bins_of_libsdnn(parameter_file):
-    symbols = (
+    number_and_symbol = (
         "[NUMERICAL(RANDOM_INVERSE(1001,5)):2]",
         "[NUMERICAL(RANDOM_INVERSE(10,5)), SYMBOLIC(RANDOM_INVERSE(4,5))]",
     )
-    parameters = libsdnn.read_parameter_file(parameter_file(symbols))
+    parameters = libsdnn.read_parameter_file(parameter_file(number_and_symbol))
     # Numbers from 0 to 1 have ten bins, symbols are their bins; both are clipped.
     values = [(0.0, 0), (0.0999, 1), (0.1, 3), (1.0, 4), (-3.0, -2), (2.0, 9)]
     expected = [(0, 0), (0, 1), (1, 3), (9, 3), (0, 0), (9, 3)]
