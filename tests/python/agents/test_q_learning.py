@@ -106,6 +106,7 @@ def test_observations_are_scaled_by_the_bounds_and_clipped():
     assert np.array_equal(agent.q_values([7.0, -1e300, 0.0]), inside)
     assert np.array_equal(agent.q_values(np.array([2, -2, 0], dtype=np.int8)), inside)
     assert np.array_equal(agent.q_values(np.float32([2.0, -2.0, 0.0])), inside)
+    # The bounds -2 and 2 of the space become 0 and 1 in the network.
     (core,) = agent.networks
     assert np.array_equal(core.values([1.0, 0.0, 0.5]), inside)
 

@@ -410,6 +410,7 @@ def test_a_training_stopped_after_a_failure_resumes_exactly(n_envs, tmp_path):
     envs = [FailsOnce] * (n_envs - 1) + [functools.partial(FailsOnce, ("step", 33))]
 
     def finished(stop):
+        """Continue after the failure at step 33; stop at a step and continue from its file."""
         env = gym.vector.SyncVectorEnv(envs) if n_envs > 1 else envs[0]()
         agent = make(FailsOnce.observation_space, FailsOnce.action_space, seed=3, **options)
         training = Training(agent, env, steps=200, callbacks=[Stop(stop, tmp_path / "t")])
@@ -422,7 +423,7 @@ def test_a_training_stopped_after_a_failure_resumes_exactly(n_envs, tmp_path):
         assert loaded.run().is_finished
         return loaded
 
-    whole, cut = finished(1000), finished(150)
+    whole, cut = finished(stop=1000), finished(stop=150)  # of 200 steps: never, and once
     assert states_equal(whole.agent, cut.agent)
     assert whole.next_episode == cut.next_episode
 
@@ -550,7 +551,7 @@ def test_a_training_stopped_before_or_after_the_end_of_its_warm_up_resumes_exact
 @pytest.mark.parametrize("missing", ["hold", "code"])
 def test_a_training_with_missing_observations_resumes_exactly(missing, tmp_path):
     class Echo(Corridor):
-        """Nothing comes back from ahead where the corridor continues, as of a sonar."""
+        """A sonar that receives no echo in cell 1: the reading is infinite, that is missing."""
 
         observation_space = gym.spaces.Box(0.0, np.inf, (1,), dtype=np.float64)
 
