@@ -1,4 +1,4 @@
-"""Statements of the pages on agents hold."""
+"""The pages on agents list the options, presets, spaces, features and results of the library."""
 
 import re
 from pathlib import Path
@@ -21,12 +21,9 @@ from sdnn.export import export_c_header
 
 DOCS = Path(__file__).parents[2] / "docs"
 AGENTS = {
-    "q-lambda": SDNNQLambda,
-    "actor-critic": SDNNActorCritic,
-    "sdnn-c": SDNNQLearning,
-    "rbf": RBFQLearning,
-    "fuzzy": FuzzyQLearning,
-}
+    "q-lambda": SDNNQLambda, "actor-critic": SDNNActorCritic, "sdnn-c": SDNNQLearning,
+    "rbf": RBFQLearning, "fuzzy": FuzzyQLearning,
+}  # fmt: skip
 
 
 def test_options_named_by_the_guides_exist():

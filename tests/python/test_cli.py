@@ -1,3 +1,5 @@
+"""The command ``sdnn reproduce`` with fake trials, and what all commands have in common."""
+
 import csv
 import json
 import os
@@ -28,7 +30,7 @@ def invoke(invoke):
     return partial(invoke, trial=FakeTrial)
 
 
-def test_help_lists_commands_and_version_the_environment(invoke):
+def test_help_lists_the_commands_and_version_describes_the_environment(invoke):
     help_text = invoke("--help").stdout
     assert all(re.search(rf"^  {name} .*\w\.$", help_text, re.MULTILINE) for name in main.commands)
     version, compiler, *others = invoke("--version").stdout.splitlines()
@@ -61,17 +63,13 @@ def test_a_quick_reproduction_writes_marked_files_and_a_summary(invoke, tmp_path
     result = invoke("reproduce", "a", "--quick", "--out", "out")
     assert result.exit_code == 0
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
-        "experiment-a-quick.png",
-        "experiment-a-quick.svg",
-        "report-quick.html",
-        "results-quick.csv",
-        "results-quick.md",
-        "results.sqlite",
-        "table-quick.json",
-    ]
+        "experiment-a-quick.png", "experiment-a-quick.svg", "report-quick.html",
+        "results-quick.csv", "results-quick.md", "results.sqlite", "table-quick.json",
+    ]  # fmt: skip
     assert result.stderr == ""  # no progress where there is no terminal
     assert "QUICK LOOK" in result.stdout
     assert "so far" in result.stdout
+    # Two trials of each of the two cases of Experiment A.
     assert "4 of 4 trials are stored in out (4 run now)" in " ".join(result.stdout.split())
     again = invoke("reproduce", "a", "--quick", "--out", "out")
     assert "(0 run now)" in " ".join(again.stdout.split())  # the stored ones are taken
@@ -109,13 +107,9 @@ def test_smaller_reproductions_do_not_overwrite_the_files_of_the_full_one(invoke
     assert {path: path.read_bytes() for path in files} == before
     names = {path.name for path in (tmp_path / "out").glob("table*")}
     assert names == {
-        "table.json",
-        "table-2-trials.json",
-        "table-1000-episodes.json",
-        "table-seed-1.json",
-        "table-sdnn-c-with-robust-quick.json",
-        "table-sdnn-c-robust-quick.json",
-    }
+        "table.json", "table-2-trials.json", "table-1000-episodes.json", "table-seed-1.json",
+        "table-sdnn-c-with-robust-quick.json", "table-sdnn-c-robust-quick.json",
+    }  # fmt: skip
 
 
 def test_a_trial_of_the_most_episodes_is_accepted_and_of_more_refused():
@@ -238,14 +232,10 @@ def test_results_of_other_agents_are_written_to_separate_files(invoke, tmp_path,
     assert "RBFN, FQL instead of the agents of its cases" in result.stdout
     names = {path.name for path in (tmp_path / "out").iterdir()} - set(before)
     assert names == {
-        "experiment-a-rbf-fuzzy-quick.png",
-        "experiment-a-rbf-fuzzy-quick.svg",
-        "report-rbf-fuzzy-quick.html",
-        "results-rbf-fuzzy-quick.csv",
-        "results-rbf-fuzzy-quick.md",
-        "results.sqlite",
-        "table-rbf-fuzzy-quick.json",
-    }
+        "experiment-a-rbf-fuzzy-quick.png", "experiment-a-rbf-fuzzy-quick.svg",
+        "report-rbf-fuzzy-quick.html", "results-rbf-fuzzy-quick.csv", "results-rbf-fuzzy-quick.md",
+        "results.sqlite", "table-rbf-fuzzy-quick.json",
+    }  # fmt: skip
     assert {name: (tmp_path / "out" / name).read_bytes() for name in before} == before
     table = json.loads((tmp_path / "out" / "table-rbf-fuzzy-quick.json").read_text())
     assert [(case["case"], case["agent"]) for case in table["experiments"][0]["cases"]] == [
@@ -441,10 +431,8 @@ def test_a_reproduction_of_ten_episodes_runs_in_a_separate_process(tmp_path):
     assert process.stderr == ""
     assert process.returncode == 0
     (experiment,) = json.loads(process.stdout)["experiments"]
-    assert [case["measures"]["final_steps"]["median"]["lower"] for case in experiment["cases"]] == [
-        None,
-        None,
-    ]
+    medians = [case["measures"]["final_steps"]["median"] for case in experiment["cases"]]
+    assert [median["lower"] for median in medians] == [None] * 2, "a single trial has no interval"
     assert all(case["n_decisions"] > 0 for case in experiment["cases"])
 
 

@@ -1,3 +1,5 @@
+"""Ctrl-C during a training and in library code."""
+
 import os
 import signal
 import threading
@@ -13,7 +15,7 @@ from sdnn.support.interrupts import Interrupts, stay_interrupts, thread_pool
 
 
 @pytest.fixture(autouse=True)
-def usual_handler():
+def python_handler():
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
@@ -21,14 +23,14 @@ def usual_handler():
 
 
 def test_the_first_signal_calls_back_and_the_second_interrupts():
-    asked = []
-    with Interrupts(lambda: asked.append(1)) as interrupts:
+    calls = []
+    with Interrupts(lambda: calls.append(1)) as interrupts:
         assert interrupts.received is None
         os.kill(os.getpid(), signal.SIGINT)
-        assert (asked, interrupts.received) == ([1], signal.SIGINT)
+        assert (calls, interrupts.received) == ([1], signal.SIGINT)
         with pytest.raises(KeyboardInterrupt):
             os.kill(os.getpid(), signal.SIGINT)
-    assert asked == [1]
+    assert calls == [1]
 
 
 def test_a_custom_handler_is_not_replaced():
@@ -129,14 +131,14 @@ def test_ctrl_c_converted_to_another_error_is_raised_as_keyboard_interrupt():
 
 
 def test_unrelated_errors_and_handled_ctrl_c_are_not_changed():
-    with pytest.raises(ValueError, match="own"), stay_interrupts():
-        raise ValueError("of its own")
-    asked = []
-    with Interrupts(lambda: asked.append(1)), stay_interrupts():
+    with pytest.raises(ValueError, match="unrelated"), stay_interrupts():
+        raise ValueError("unrelated")
+    calls = []
+    with Interrupts(lambda: calls.append(1)), stay_interrupts():
         press_ctrl_c()
-    assert asked == [1]
+    assert calls == [1]
     with stay_interrupts():
-        pass
+        pass  # raises nothing
 
 
 def test_in_other_threads_the_handler_of_ctrl_c_is_not_replaced():

@@ -88,14 +88,10 @@ def test_values_that_numpy_would_convert_silently_are_refused(name):
 
 
 NUMBERS = {
-    "a text": "1",
-    "a text of NumPy": np.str_("1"),
-    "a date": np.datetime64(1, "ns"),
-    "a time": np.timedelta64(1, "ns"),
-    "complex": 1 + 0j,
-    "masked": np.ma.masked_array(1, True),
+    "a text": "1", "a text of NumPy": np.str_("1"), "a date": np.datetime64(1, "ns"),
+    "a time": np.timedelta64(1, "ns"), "complex": 1 + 0j, "masked": np.ma.masked_array(1, True),
     "bytes": b"1",
-}
+}  # fmt: skip
 BOOLS = {"True": True, "True of NumPy": np.True_, "an array": np.array(True)}
 
 

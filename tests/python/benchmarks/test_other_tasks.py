@@ -271,7 +271,7 @@ def test_wrappers_hide_variables_delay_actions_and_leave_the_goals_reward(script
     noisy = gym.make("bench/Sensors-v0", task="CartPole-v1", hidden=[1, 3], noise=0.05)
     assert 0.01 < np.abs(np.subtract(rollout(noisy, [1, 1, 0]), shown)).max() < 1
     late = rollout(gym.make("bench/Sensors-v0", task="CartPole-v1", delay=2), [1, 1, 0, 0])
-    assert np.array_equal(late, rollout(usual, [0, 0, 1, 1]))
+    assert np.array_equal(late, rollout(usual, [0, 0, 1, 1]))  # two steps of action 0 come first
 
     hill = gym.make("bench/Sensors-v0", task="MountainCar-v0", goal_only=True)
     observation, _ = hill.reset(seed=1)

@@ -1,3 +1,5 @@
+"""The paper's experiments and cases, and the configurations and seeds of their trials."""
+
 import json
 from dataclasses import replace
 
@@ -59,6 +61,7 @@ def test_cases_with_the_same_id_have_the_same_sensors():
 def test_presets_are_added_to_the_agents_of_a_case():
     experiment = EXPERIMENTS[0]
     both = experiment.with_agents([], ["robust", "paper", "robust"])
+    # The preset "paper" is the usual agent, and a preset named twice is added once.
     assert [case.agents for case in both.cases] == 2 * [("sdnn-c", "sdnn-c-robust")]
 
 

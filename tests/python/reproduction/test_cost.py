@@ -1,3 +1,5 @@
+"""Times of a step by the number of inputs: how they are planned, stored and shown."""
+
 import json
 import math
 from dataclasses import replace
@@ -147,8 +149,7 @@ def test_the_figure_of_costs_shows_the_stored_medians(tmp_path, measured):
 
 @pytest.mark.parametrize("series", SERIES, ids=[series.id for series in SERIES])
 def test_every_series_measures_a_real_agent_and_its_table(series):
-    times = measure_steps(series, 2, SMALL)
-    microseconds, n_steps, table_bytes = times
+    microseconds, n_steps, table_bytes = measure_steps(series, 2, SMALL)
     assert len(microseconds) == 3
     assert min(microseconds) > 0
     assert n_steps >= 1

@@ -1,3 +1,5 @@
+"""Figures and reports of experiments, drawn from fake trials."""
+
 import base64
 import io
 import itertools
@@ -85,7 +87,7 @@ def test_a_figure_states_its_trials_and_configurations(results):
         assert result.config_hash[:8] in text  # figures show 8 digits
 
 
-def test_a_quick_figure_says_so_in_its_title_and_panels(results):
+def test_a_quick_figure_is_marked_in_its_title_and_panels(results):
     quick = all_text(draw_experiment(EXPERIMENT, results, quick=True))
     assert "QUICK LOOK, not the result" in quick
     assert quick.count("quick") == 2  # a watermark in each panel
@@ -189,7 +191,9 @@ def test_tables_show_cases_and_claims(report):
         assert {len(row) for row in table.rows} == {len(table.header)}
     assert [row[0] for row in claims.rows] == ["1", "2", "8"]
     assert claims.header[-1] == "ours, so far [95 % interval]"
-    assert claims.rows[0][-1] == "episodes to learn: 50 [30, 50], 60 [50, 60]"
+    medians = [result.medians["episodes_to_learn"] for result in report.results]
+    shown = ", ".join(f"{m.value:g} [{m.lower:g}, {m.upper:g}]" for m in medians)
+    assert claims.rows[0][-1] == f"episodes to learn: {shown}"
     assert {row[-1] for row in checks.rows} == {"not judged", "not run"}
 
 
@@ -262,7 +266,7 @@ def test_the_html_report_embeds_pictures_tables_and_settings(report, monkeypatch
     assert "4 of 6 trials were stored before" in later
 
 
-def test_claims_say_which_measures_need_longer_trials(tmp_path, run, collected):
+def test_the_report_names_measures_that_need_longer_trials(tmp_path, run, collected):
     (experiment,) = select_experiments("b")
     run(tmp_path, plan_trials(experiment.cases, 2, 0, 100))
     results = collected(experiment, tmp_path, 2, 100)

@@ -1,3 +1,5 @@
+"""Stored reference results, and how they decide claims that ten trials leave undecided."""
+
 import importlib.util
 import math
 from dataclasses import replace
@@ -105,7 +107,7 @@ def test_chances_without_trials_of_every_subject_are_none():
 
 
 @pytest.mark.parametrize(
-    ("own", "more", "share", "settled"),
+    ("verdict", "verdict_with_more", "chance", "decided"),
     [
         ("holds", None, None, "holds"),
         ("undecided", None, None, "undecided"),
@@ -119,17 +121,17 @@ def test_chances_without_trials_of_every_subject_are_none():
         ("not run", "holds", 1.0, "not run"),
     ],
 )
-def test_more_trials_or_the_chance_decide_a_claim(own, more, share, settled):
-    def outcome(word, **found):
-        checked = CheckOutcome(CLAIMS[0].checks[0], None, Verdict(word))
-        return ClaimOutcome(CLAIMS[0], (checked,), **found)
+def test_more_trials_or_the_chance_decide_a_claim(verdict, verdict_with_more, chance, decided):
+    def outcome(name, **more):
+        checked = CheckOutcome(CLAIMS[0].checks[0], None, Verdict(name))
+        return ClaimOutcome(CLAIMS[0], (checked,), **more)
 
     claim = outcome(
-        own,
-        more=None if more is None else outcome(more),
-        chance=None if share is None else Estimate(share, share, share),
+        verdict,
+        more=None if verdict_with_more is None else outcome(verdict_with_more),
+        chance=None if chance is None else Estimate(chance, chance, chance),
     )
-    assert claim.decided == Verdict(settled)
+    assert claim.decided == Verdict(decided)
 
 
 def test_reference_trials_decide_claims_only_with_all_cases():
@@ -202,7 +204,7 @@ def test_written_reference_results_are_read_unchanged(monkeypatch, tmp_path, fak
 
 
 def test_short_trials_are_refused_as_reference_results(fake_results):
-    short = replace(fake_results[0], last_episode=300)
+    short = replace(fake_results[0], last_episode=300)  # of case s4; the paper has 15,000
     refuses("s4", script.reference_csv, [short], 7)
 
 
