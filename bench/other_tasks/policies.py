@@ -156,7 +156,7 @@ def table(results) -> str:
             cells.append(cell)
         rows.append((title, *cells))
     titles = (f"{task} ({len(returns[task, 'final'])} seeds)" for task in tasks)
-    return markdown(("policy of SDNNActorCritic", *titles), rows)
+    return markdown(("policy", *titles), rows)
 
 
 def main() -> None:

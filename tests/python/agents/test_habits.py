@@ -422,6 +422,7 @@ def test_two_evaluations_without_improvement_stop_a_training(tmp_path):
     # Evaluations every 10 steps: the third and fourth are no better than the second one.
     assert run(tmp_path, [1.0, 3.0, 2.0, 3.0, 9.0, 9.0], stop).n_steps == 40
     assert run(tmp_path, [1.0, 3.0, 2.0, 4.0, 3.0, 5.0], stop).n_steps == 60
+    refuses("max_evaluations", StopTrainingOnNoImprovement, 0)
 
 
 @pytest.mark.parametrize("interval", [0, -1, 2.5, None])
