@@ -358,7 +358,9 @@ class BaseSDNN(Fitted, CodedInputs):
         if not (is_auto or is_large) or table.shape[1] < (2 if is_auto else 3):
             return None
         seed = int(check_random_state(self.random_state).randint(2**31 - 1))
-        model = clone(self).set_params(random_state=seed, early_stopping=False, verbose=0)
+        model = clone(self).set_params(
+            random_state=seed, early_stopping=False, calibrate=False, verbose=0
+        )
         codings = self._codings(X, table)
         complete = [with_categories(coding, table[:, i]) for i, coding in enumerate(codings)]
         if complete != codings:
@@ -424,7 +426,7 @@ class BaseSDNN(Fitted, CodedInputs):
             return
         if self.out_of_range == "error":
             raise ValueError(f"X has {first}, but out_of_range is 'error'")
-        if self.n_inputs_out_of_range_ == 0 and not self._has_outliers:
+        if self._warns and self.n_inputs_out_of_range_ == 0 and not self._has_outliers:
             message = f"X has {first}: values outside a range are clipped"
             warn_caller(message, OutOfRangeWarning)
         self.n_inputs_out_of_range_ += n_outside

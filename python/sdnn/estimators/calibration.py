@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class CalibrationError(ValueError):
-    """Samples of which no fifth can be held out to calibrate."""
+    """An error for samples of which no fifth can be held out to calibrate."""
 
 
 class HeldOut(NamedTuple):
@@ -40,7 +39,7 @@ def learn_without_fifth(
     """Train a model like a fitted one without a fifth of the samples.
 
     It has the same codings and pairs. A class of a single sample is not held out. CalibrationError
-    for fewer than ten samples, or if each class has a single sample.
+    for fewer than ten samples, too few for early stopping, or too few of each class.
     """
     targets = np.asarray(y)
     if len(targets) < FEWEST_SAMPLES:
@@ -52,13 +51,13 @@ def learn_without_fifth(
     if is_stratified:
         labels, counts = np.unique(targets, return_counts=True)
         is_held &= ~np.isin(targets, labels[counts == 1])
-        if not is_held.any():
-            raise CalibrationError("calibrate must be False where hardly a class has two samples")
+        n_learned = len(targets) - np.count_nonzero(is_held)
+        if not is_held.any() or n_learned < 2 * len(labels):
+            raise CalibrationError("calibrate must be False where classes have hardly two samples")
     weights = np.ones(len(targets)) if sample_weight is None else np.asarray(sample_weight)
     model = clone(fitted).set_params(
         calibrate=False,
         random_state=seed,
-        verbose=0,
         coding=[(coding, [index]) for index, coding in enumerate(fitted.codings_)],
         pairs=[(mu, None if mu == nu else nu) for mu, nu in fitted.pairs_],
         n_pattern_units=fitted.network_.input_code.core.n_units,
@@ -66,10 +65,12 @@ def learn_without_fifth(
     # The smaller network corrects as large a share of its errors.
     if len(targets) > fitted._largest_full_sample:
         model._largest_full_sample = 0
+    model._warns = False  # the fit to all samples has warned already
     learned, held = np.flatnonzero(~is_held), np.flatnonzero(is_held)
+    n_to_stop = round(model.validation_fraction * len(learned))
+    if model.early_stopping and n_to_stop >= len(learned):
+        raise CalibrationError("calibrate must be False with too few samples for early stopping")
     learned_weights = None if sample_weight is None else weights[learned]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the fit to all samples has warned already
-        model.fit(samples_in(X, learned), targets[learned], learned_weights)
+    model.fit(samples_in(X, learned), targets[learned], learned_weights)
     weights_of_held = weights[held].astype(np.float64)
     return HeldOut(model, held, samples_in(X, held), targets[held], weights_of_held)

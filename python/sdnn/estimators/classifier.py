@@ -56,12 +56,14 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
     calibrate : bool, optional
         Whether `fit` also trains a network without a fifth of each class, and gives `predict_proba`
         the steepness with the smallest log loss on it, in about twice the time. Needs several units
-        per class and ten samples. None: where that is so, up to 10,000 samples.
+        per class and ten samples. None: for up to 10,000 samples that allow it, without a warm
+        start.
 
     Attributes
     ----------
     steepness_ : float
-        After a calibration, the factor of scores in the softmax of `predict_proba`; else 6.
+        Only after a calibration: the factor of scores in the softmax of `predict_proba`, which is
+        6 otherwise.
     classes_ : ndarray, shape (n_classes,)
         The labels, sorted; a `RiverClassifier` appends later labels in the order of the stream.
     validation_scores_ : ndarray, shape (n_epochs,) or (0,)
@@ -174,8 +176,8 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
     def predict_proba(self, X: ArrayLike) -> Floats:
         """Return a softmax of the scores, shape (n_samples, n_classes).
 
-        Its steepness is a constant, or with ``calibrate`` fits held-out samples; see also
-        scikit-learn's `CalibratedClassifierCV`. Needs several units per class.
+        Its steepness is fitted to held-out samples (see ``calibrate``), or else a constant; see
+        also scikit-learn's `CalibratedClassifierCV`. Needs several units per class.
         """
         return self._probabilities(self._bins(X), self._n_threads())
 

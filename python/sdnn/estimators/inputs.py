@@ -86,6 +86,8 @@ class CodedInputs(BaseEstimator):
             if "constraints" in field.metadata
         }
 
+    _warns = True
+    """Whether `fit` warns of values outside of ranges."""
     _has_outliers = False
     """Whether the last `fit` left outliers out of a range."""
 
@@ -260,7 +262,8 @@ class CodedInputs(BaseEstimator):
         if is_left_out:
             effect = "it is left out of the range, and clipped; ranges='all' takes it in"
         others = f"far from the other values, which are within {list(usual)}"
-        warn_caller(f"{name} has {outlier}, {others}: {effect}", OutlierWarning)
+        if self._warns:
+            warn_caller(f"{name} has {outlier}, {others}: {effect}", OutlierWarning)
         self._has_outliers |= is_left_out
         return usual if is_left_out else full
 

@@ -268,7 +268,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         )
         if self.out_of_range == "error":
             raise ValueError(f"{problem}, but out_of_range is 'error'")
-        if self.n_outputs_out_of_range_ == 0 and not self._has_outliers:
+        if self._warns and self.n_outputs_out_of_range_ == 0 and not self._has_outliers:
             effect = "are clipped" if self.out_of_range == "clip" else "widen it"
             warn_caller(f"{problem}: values outside the range {effect}", OutOfRangeWarning)
         if self.out_of_range == "clip" or at_once:

@@ -1,21 +1,25 @@
 """Calibration on held-out samples: probabilities of the classifier, intervals of the regressor."""
 
 import math
+import warnings
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pandas as pd
+import pytest
 from sklearn.base import clone
 from sklearn.datasets import load_iris
 
 from refusals import refuses
 from sdnn import SDNNClassifier, SDNNRegressor
-from sdnn.coding import Symbolic
-from sdnn.estimators import classifier
-from sdnn.estimators.calibration import held_out_fifth
+from sdnn.coding import RandomInverse, Symbolic
+from sdnn.estimators import OutOfRangeWarning, classifier
+from sdnn.estimators.calibration import held_out_fifth, learn_without_fifth
 from sdnn.estimators.classifier import STEEPNESS
 from sdnn.estimators.fitted import STEEPNESSES
 
 OPTIONS = {"n_pattern_units": 40, "random_state": 0}
+EARLY = {"early_stopping": True, "validation_fraction": 0.94}
 
 
 def overlapping(n_samples=600, seed=0):
@@ -101,6 +105,8 @@ def test_a_classifier_is_calibrated_by_default_where_a_fifth_can_be_held_out(mon
     assert default.steepness_ == calibrated.steepness_
     not_calibrated = [
         SDNNClassifier(**OPTIONS).fit(X[:9], y[:9]),
+        SDNNClassifier(**OPTIONS, **EARLY).fit(X[:10], y[:10]),  # eight: too few to hold out .94
+        SDNNClassifier(**OPTIONS).fit(X, np.arange(60) % 29),  # 60 - 12 samples of 29 classes
         SDNNClassifier(**OPTIONS).fit(X[:12], np.arange(12)),  # classes of a single sample
         SDNNClassifier(**OPTIONS, n_units_per_class=1).fit(X, y),
         SDNNClassifier(**OPTIONS, warm_start=True).fit(X, y),
@@ -109,6 +115,30 @@ def test_a_classifier_is_calibrated_by_default_where_a_fifth_can_be_held_out(mon
     monkeypatch.setattr(classifier, "MOST_CALIBRATED", 59)
     not_calibrated.append(SDNNClassifier(**OPTIONS).fit(X, y))
     assert not any(hasattr(model, "steepness_") for model in not_calibrated)
+
+
+def test_only_the_network_of_the_selected_features_is_calibrated(monkeypatch):
+    calibrated = []
+
+    def note(fitted, *samples, **options):
+        calibrated.append(fitted)
+        return learn_without_fifth(fitted, *samples, **options)
+
+    monkeypatch.setattr(classifier, "learn_without_fifth", note)
+    model = SDNNClassifier(pairs="auto", **OPTIONS).fit(*overlapping(60))
+    assert len(calibrated) == 1
+    assert calibrated[0].pairs_ == model.pairs_
+
+
+def test_the_second_network_repeats_no_warning_and_leaves_the_filters_of_warnings_alone():
+    X, y = overlapping(60)
+    before = list(warnings.filters)
+    with ThreadPoolExecutor(4) as threads:
+        list(threads.map(lambda _: SDNNClassifier(**OPTIONS).fit(X, y), range(8)))
+    assert warnings.filters == before
+    with pytest.warns(OutOfRangeWarning) as caught:
+        SDNNClassifier(RandomInverse(low=-0.5, high=0.5), **OPTIONS).fit(X, y)
+    assert len(caught) == 1
 
 
 def test_calibration_uses_sample_weights_and_ignores_samples_of_weight_0():
