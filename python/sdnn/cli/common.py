@@ -113,12 +113,18 @@ def value_of(text: str) -> object:
 
 
 def named_values(option: str, pairs: Iterable[str]) -> Iterator[tuple[str, str]]:
-    """Split texts like ``name=value``; UsageError that names the option for other texts."""
+    """Split texts like ``name=value``; UsageError for other texts, and for a name given twice."""
+    texts: dict[str, str] = {}
     for pair in pairs:
-        name, equals, text = pair.partition("=")
-        if not equals or not name.strip():
+        name, equals, text = (part.strip() for part in pair.partition("="))
+        if not equals or not name:
             raise click.UsageError(f"{option} must be NAME=VALUE, got {pair!r}")
-        yield name.strip(), text.strip()
+        if name in texts:
+            raise click.UsageError(
+                f"{option} {name} must be given once, got {texts[name]!r} and {text!r}"
+            )
+        texts[name] = text
+        yield name, text
 
 
 @contextmanager

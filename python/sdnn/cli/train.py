@@ -46,8 +46,8 @@ def _options() -> list[click.Option]:
     for key in KEYS:
         schema: dict[str, Any] = {"$ref": "RunSpec"}
         for name in key.split("."):
-            schemes = (schema, *schema.get("anyOf", ()))  # `anyOf`: a table that may be null
-            reference = next(scheme["$ref"] for scheme in schemes if "$ref" in scheme)
+            alternatives = (schema, *schema.get("anyOf", ()))  # `anyOf`: a table that may be null
+            reference = next(part["$ref"] for part in alternatives if "$ref" in part)
             table = reference.rpartition("/")[2]
             schema = schemas[table]["properties"][name]
         types = (part for part in schema.get("anyOf", ()) if part.get("type") != "null")
@@ -176,12 +176,13 @@ def _options_by_key(env_id: str | None, options: Options) -> Options:
     by_option = {key: (option_of(key), value) for key, value in values.items()}
 
     def set_once(option: str, key: str, value: object) -> None:
-        """Set `key` to the value of an option; refuse a key that another option has set."""
-        other, before = by_option.setdefault(key, (option, value))
-        if other != option:
+        """Set `key` to the value of an option; refuse a key that is set already."""
+        if key in by_option:
+            other, before = by_option[key]
             raise click.UsageError(
                 f"{option} must not set {key}, which {other} sets: got {value!r} and {before!r}"
             )
+        by_option[key] = option, value
         values[key] = value
 
     if env_id is not None:
