@@ -148,10 +148,10 @@ class ParallelPerceptron {
   /// Calls consume(layer, query, potentials) once for each layer and query, in any order and from
   /// up to `n_threads` threads at a time.
   ///
-  /// Similar queries share most of their code, and many queries share the contribution of a pair of
-  /// inputs. Shapes: bins (n_queries, n_inputs), potentials (n_padded_units,), whose first n_units
-  /// are valid. Throws std::invalid_argument for no layers or layers that differ in their code or
-  /// size, bins out of range or n_threads < 1.
+  /// Similar queries share most of their code, which a walk by short steps uses; in other walks
+  /// many queries share the contribution of a pair of inputs. Shapes: bins (n_queries, n_inputs),
+  /// potentials (n_padded_units,), whose first n_units are valid. Throws std::invalid_argument for
+  /// no layers or layers that differ in their code or size, bins out of range or n_threads < 1.
   template <class Consume>
   static void for_each_query(Layers layers, std::span<const std::int32_t> bins, int n_threads,
                              const Consume& consume) {
@@ -164,58 +164,17 @@ class ParallelPerceptron {
     core::require_in_range("n_threads", n_threads, 1, 4096);
     code.check_bins(bins);
     const auto order = query_order(bins, code.n_inputs());
-    std::vector<std::shared_ptr<const Narrow>> narrow;
+    NarrowWeights narrow;
     if (order.size() > kFewQueries) {
       for (const ParallelPerceptron* const layer : layers) {
         narrow.push_back(layer->narrow_.get([&] { return Narrow(code, layer->weights_); }));
       }
     }
-    // Either computes each query's potentials from those of the query before ...
     if (narrow.empty() || is_short_walk(code, bins, order)) {
-      const auto sweep = [&](std::size_t begin, std::size_t end) {
-        const auto queries = std::span(order).subspan(begin, end - begin);
-        for (std::size_t k = 0; k < layers.size(); ++k) {
-          const auto answer = [&](const auto& tiles, std::size_t n_per_sum) {
-            layers[k]->sweep(
-                tiles, n_per_sum, bins, queries,
-                [&](std::size_t query, const std::int32_t* values) { consume(k, query, values); });
-          };
-          if (narrow.empty() || narrow[k]->n_chunks == 0) {
-            answer(layers[k]->weights_, std::size_t{1} << 30);  // no potential can overflow
-          } else {
-            answer(narrow[k]->tiles, narrow[k]->n_per_sum);
-          }
-        }
-      };
-      return in_parts(order.size(), layers[0]->most_at_once(kSweptAtOnce), n_threads, sweep);
+      sweep_queries(layers, narrow, bins, order, n_threads, consume);
+    } else {
+      add_pairs(layers, narrow, bins, n_threads, consume);
     }
-    // ... or adds the contributions of pairs of inputs, each along a short walk of its own.
-    const auto answer = [&](const auto& tiles, std::size_t n_chunks) {
-      const std::size_t n_padded = layers[0]->n_padded_units();
-      const auto add = [&](std::size_t begin, std::size_t end) {
-        const std::size_t n = end - begin;
-        std::vector<std::int32_t> values(layers.size() * n * n_padded);
-        for (std::size_t k = 0; k < layers.size() * n; ++k) {
-          layers[k / n]->start_from_zero(&values[k * n_padded]);
-        }
-        add_codes(code, std::span(tiles), n_chunks,
-                  bins.subspan(begin * code.n_inputs(), n * code.n_inputs()), values.data());
-        for (std::size_t k = 0; k < layers.size() * n; ++k) {
-          consume(k / n, begin + k % n, &values[k * n_padded]);
-        }
-      };
-      in_parts(order.size(), layers[0]->most_at_once(kAddedAtOnce / layers.size()), n_threads, add);
-    };
-    const std::size_t n_chunks = (*std::ranges::min_element(narrow, {}, [](const auto& weights) {
-                                   return weights->n_chunks;
-                                 }))->n_chunks;
-    std::vector<const WeightTiles<std::int16_t>*> tiles;
-    std::vector<const WeightTiles<std::int32_t>*> wide_tiles;
-    for (std::size_t k = 0; k < layers.size(); ++k) {
-      tiles.push_back(&narrow[k]->tiles);
-      wide_tiles.push_back(&layers[k]->weights_);
-    }
-    n_chunks > 0 ? answer(tiles, n_chunks) : answer(wide_tiles, kMostChunks);
   }
   /// Calls consume(query, potentials) for this layer.
   template <class Consume>
@@ -311,10 +270,72 @@ class ParallelPerceptron {
       tiles = WeightTiles<std::int16_t>(weights);
       n_per_sum = static_cast<std::size_t>(kLargest / std::max(tiles.largest(), std::int64_t{1}));
     }
-    std::size_t n_chunks;       // chunks whose total fits
-    std::size_t n_per_sum = 0;  // weights whose sum fits
+    std::size_t n_chunks;       // chunks whose total fits into 16 bits
+    std::size_t n_per_sum = 0;  // weights whose sum fits into 16 bits
     WeightTiles<std::int16_t> tiles;
   };
+
+  /// Copies of the layers' weights in 16 bits; none for few queries.
+  using NarrowWeights = std::vector<std::shared_ptr<const Narrow>>;
+
+  /// Calls consume(layer, query, potentials), where the potentials of each query follow from those
+  /// of the query before in `order`, by the columns that differ.
+  template <class Consume>
+  static void sweep_queries(Layers layers, const NarrowWeights& narrow,
+                            std::span<const std::int32_t> bins,
+                            std::span<const std::uint32_t> order, int n_threads,
+                            const Consume& consume) {
+    const auto sweep = [&](std::size_t begin, std::size_t end) {
+      const auto queries = order.subspan(begin, end - begin);
+      for (std::size_t k = 0; k < layers.size(); ++k) {
+        const auto answer = [&](const auto& tiles, std::size_t n_per_sum) {
+          layers[k]->sweep(
+              tiles, n_per_sum, bins, queries,
+              [&](std::size_t query, const std::int32_t* values) { consume(k, query, values); });
+        };
+        if (narrow.empty() || narrow[k]->n_chunks == 0) {
+          answer(layers[k]->weights_, std::size_t{1} << 30);  // no potential can overflow
+        } else {
+          answer(narrow[k]->tiles, narrow[k]->n_per_sum);
+        }
+      }
+    };
+    in_parts(order.size(), layers[0]->most_at_once(kSweptAtOnce), n_threads, sweep);
+  }
+
+  /// Calls consume(layer, query, potentials), where potentials are sums of the contributions of
+  /// pairs of inputs. All layers use their narrow weights if those of each fit.
+  template <class Consume>
+  static void add_pairs(Layers layers, const NarrowWeights& narrow,
+                        std::span<const std::int32_t> bins, int n_threads, const Consume& consume) {
+    const Code& code = *layers[0]->code_;
+    const auto answer = [&](const auto& tiles, std::size_t n_chunks) {
+      const std::size_t n_padded = layers[0]->n_padded_units();
+      const auto add = [&](std::size_t begin, std::size_t end) {
+        const std::size_t n = end - begin;
+        std::vector<std::int32_t> values(layers.size() * n * n_padded);
+        for (std::size_t k = 0; k < layers.size() * n; ++k) {
+          layers[k / n]->start_from_zero(&values[k * n_padded]);
+        }
+        add_codes(code, std::span(tiles), n_chunks,
+                  bins.subspan(begin * code.n_inputs(), n * code.n_inputs()), values.data());
+        for (std::size_t k = 0; k < layers.size() * n; ++k) {
+          consume(k / n, begin + k % n, &values[k * n_padded]);
+        }
+      };
+      in_parts(bins.size() / code.n_inputs(), layers[0]->most_at_once(kAddedAtOnce / layers.size()),
+               n_threads, add);
+    };
+    const auto& worst = *std::ranges::min_element(
+        narrow, {}, [](const auto& weights) { return weights->n_chunks; });
+    std::vector<const WeightTiles<std::int16_t>*> tiles;
+    std::vector<const WeightTiles<std::int32_t>*> wide_tiles;
+    for (std::size_t k = 0; k < layers.size(); ++k) {
+      tiles.push_back(&narrow[k]->tiles);
+      wide_tiles.push_back(&layers[k]->weights_);
+    }
+    worst->n_chunks > 0 ? answer(tiles, worst->n_chunks) : answer(wide_tiles, kMostChunks);
+  }
 
   /// The potentials of the code of zeros.
   void start_from_zero(std::int32_t* potentials) const noexcept {
