@@ -108,14 +108,14 @@ def useless_figure(rows):
 
 
 def noisy_waves(n_samples, seed):
-    """Sines, with noise whose standard deviation grows from 0.05 to 0.55."""
+    """Draw samples of a sine, with noise whose standard deviation grows from 0.05 to 0.55."""
     random = np.random.default_rng(seed)
     x = random.uniform(0, 1, n_samples)
     return x[:, None], np.sin(6 * x) + (0.05 + 0.5 * x) * random.normal(size=n_samples)
 
 
 def interval_figure():
-    """Intervals for 0.9 of the targets, of three models and of a stream whose noise changes."""
+    """Draw intervals for 0.9 of the targets, of three models and of a stream."""
     X, y = noisy_waves(400, seed=0)
     X_new, y_new = noisy_waves(400, seed=1)
     grid = np.linspace(0, 1, 400)[:, None]

@@ -19,7 +19,8 @@ static inline uint32_t sdnn_bin_of_unit(double unit, uint32_t n_bins) {
   return bin < n_bins ? bin : n_bins - 1;
 }
 
-/* The fraction of a number of turns, in [0, 1). From 2^52 on, a double has no fraction. */
+/* The fraction of a number of turns, in [0, 1]; tiny negative numbers give 1. From 2^52 on, a
+ * double has no fraction. */
 static inline double sdnn_part_of_turn(double turns) {
   double whole;
   if (!(turns > -4503599627370496.0 && turns < 4503599627370496.0)) return 0.0;

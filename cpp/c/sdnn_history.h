@@ -153,7 +153,8 @@ static inline void sdnn_correct_estimates(sdnn_real* estimates, const sdnn_real*
   }
 }
 
-/* Predicts the inputs, corrects the estimates by the errors, and writes these to the state. */
+/* Predicts the inputs, corrects the estimates by the errors of the predictions, and writes the
+ * estimates to the state. */
 static inline void sdnn_remember(sdnn_episode* episode, const sdnn_real* inputs, sdnn_real* state) {
   sdnn_real *const estimates = episode->memory, errors[SDNN_N_NUMBERS];
   uint32_t k;

@@ -45,7 +45,7 @@ typedef struct {
 static inline void sdnn_carry_kept(sdnn_agent* agent, const sdnn_part* part);
 static inline int32_t sdnn_scale_of_policy(const sdnn_agent* agent);
 
-/* Writes bytes to plain memory, a substitute for flash memory in tests. */
+/* Writes to RAM: the writer to pass if the memory is no flash. */
 static inline int sdnn_write_memory(void* context, uint32_t offset, const uint8_t* bytes,
                                     uint32_t n) {
   uint8_t* const memory = (uint8_t*)context + offset;

@@ -209,7 +209,7 @@ class RandomInverse(Ranged):
         return _core.random_inverse_patterns(n_units, self.size, fitted_field(self.n_flipped), seed)
 
     def correlations(self, n_units: int) -> NDArray[np.float64]:
-        """Return how patterns of two bins correlate: a power of the distance of the bins."""
+        """Return how patterns of two bins correlate: a constant to the power of their distance."""
         of_distances = np.power(
             1 - 4 * fitted_field(self.n_flipped) / n_units, np.arange(self.size)
         )

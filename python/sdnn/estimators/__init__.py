@@ -20,7 +20,7 @@ _load, __dir__, __all__ = attach(
 
 
 def __getattr__(name: str) -> object:
-    """Import a public class when it is first used; name the package to install if one lacks."""
+    """Import a public class when it is first used; name the package to install if it is missing."""
     try:
         return _load(name)
     except ModuleNotFoundError as error:

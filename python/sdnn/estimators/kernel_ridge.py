@@ -306,7 +306,7 @@ class SDNNKernelRidge(CodedRegressor, BaseKernelRidge):
         self._sizes_of_errors = sizes
         self.leave_one_out_residuals_ = targets[rows] - left_out
         self._residual_counts = counts[rows]
-        # The model of sizes without a sample, too; those that it was not fitted to, it predicts.
+        # Log sizes by the model without each sample; it predicts those that it was not fitted to.
         is_component = np.isin(rows, sizes.rows)
         logarithms = np.empty_like(left_out)
         positions = np.searchsorted(sizes.rows, rows[is_component])

@@ -52,9 +52,9 @@ std::vector<double> values(const Agent& agent, const State& state, std::size_t d
   return {row.begin(), row.end()};
 }
 
-// With a learning rate of 1 all values become 8. Then the imitated action rises above the best
-// other one by a tenth of the margin of 1: half of it is added to one and subtracted from the
-// other.
+// With a learning rate of 1 all values become 8, the return. Then the imitated action 2 rises above
+// the best other one, of equal ones the first, by a tenth of the margin of 1, since a call closes a
+// tenth of the gap: half of it is added to one and subtracted from the other.
 TEST(Imitation, MovesAllValuesToTheReturnAndTheBestTwoApart) {
   QLambda agent = q_lambda_of();
   agent.imitate(kState, Indices{2}, 8.0, 1.0);

@@ -79,7 +79,7 @@ TEST(AcrobotSensors, NoiseIsOneNormalNumberPerSensorInOrder) {
 }
 
 // The angle is -pi, where 0 and 1 meet; the speeds are beyond both limits, at 1 and at 0. Half of
-// the noise is negative, so it wraps or is clipped in 1,000 of 2,000 observations.
+// the noise is negative, so it wraps or is clipped in about 1,000 of 2,000 observations.
 TEST(AcrobotSensors, NoiseWrapsAnglesAndClipsOtherSensors) {
   AcrobotSensors sensors({6, 0.02}, 8, Stream::sensor_noise);
   int low = 0, high = 0, floor = 0, ceiling = 0;

@@ -93,6 +93,7 @@ TEST(KernelWindow, StaysFiniteForAnyNumbers) {
     const double target = extremes[(i * i / 7) % 12];
     window.learn(inputs, Numbers{std::isfinite(target) ? target : 0.0});
   }
+  // The window holds 15 samples, so that it forgets the extremes.
   for (int i = 0; i < 20; ++i) window.learn(Numbers{0.0, 0.0}, Numbers{1.0});
   EXPECT_NEAR(predicted(window, {0.0, 0.0}), 1.0, 0.01);
 }

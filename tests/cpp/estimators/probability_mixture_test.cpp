@@ -31,7 +31,8 @@ TEST(ProbabilityMixture, SharesAloneAreTheProbabilities) {
   EXPECT_EQ(mixture.weights(), Numbers{1.0});
 }
 
-// Experts are the shares themselves, and softmaxes of the scores times 3, 6 and 12.
+// Experts are the shares themselves, and softmaxes of the scorer's scores times 3, 6 and 12; the
+// second weight is the sum of those of the three softmaxes.
 TEST(ProbabilityMixture, WeightsAreTheLikelihoodsOfSharesAndThreeSteepnesses) {
   ProbabilityMixture mixture(1);
   mixture.learn(Numbers{0.5, 0.5}, Numbers{0.1, 0.6}, 1);

@@ -57,7 +57,7 @@ static void keep(int64_t score) { printf("%d", agent_keep(&agent, &keeper, score
 int main(void) {
   agent_begin(&agent);
   begin(2), keep(100), keep(100); /* prints 0: no policy was kept; 0, 1: the block ends, the best */
-  begin(1), keep(150), keep(140); /* 1: another length; 1: the first of its length; 0: no better */
+  begin(1), keep(150), keep(140); /* 1: one was kept; 1: the first of its length; 0: no better */
   begin(1), keep(140), keep(160); /* 1: a policy was kept; 0: below 150; 1: above it */
   return 0;
 }

@@ -171,6 +171,12 @@ def test_quick_costs_are_not_judged_and_a_slow_growth_of_rbf_costs_fails_the_cla
     assert judge_claims([], of_sdnn_c + of_rbf)[0].verdict == Verdict.FAILS
 
 
+def test_the_description_of_a_difference_names_both_cases():
+    text = str(Check(measure="final_steps", case="s6-noise", minus="s4", paper=""))
+    for words in ("final steps", "SDNN-C", "6 noisy inputs", "4 inputs"):
+        assert words in text
+
+
 def test_a_trial_without_a_collapse_counts_as_its_last_episode():
     summary = fake_trials("s4", "sdnn-c", [3] * 5 + [50] * 5)
     collapses = [PAPER_EPISODES] * 5 + [0] * 5

@@ -186,11 +186,12 @@ inline AnyAgent make_agent(const AnyApproximatorConfig& config, const AnyLearnin
   core::require(tables.empty() || is_linear(config) || (is_sdnn(config) && n_actions.size() == 1),
                 "tables", "None where actions have several dimensions", tables.size());
   if (const auto* const rules = std::get_if<FuzzyRulesConfig>(&config)) {
-    return FuzzyQLearning(detail::each_dimension(*rules, n_actions, seed,
-                                                 [](const FuzzyRulesConfig& rules, std::uint64_t) {
-                                                   return FuzzyRules(rules);
-                                                 }),
-                          std::get<FuzzyQLearningConfig>(learning), seed);
+    return FuzzyQLearning(
+        detail::each_dimension(*rules, n_actions, seed,
+                               [](const FuzzyRulesConfig& dimension_rules, std::uint64_t) {
+                                 return FuzzyRules(dimension_rules);
+                               }),
+        std::get<FuzzyQLearningConfig>(learning), seed);
   }
   if (const auto* const linear = std::get_if<LinearSDNNConfig>(&config)) {
     const auto books = [&, config = with_pattern_units(*linear)] {

@@ -85,8 +85,9 @@ inline std::array<NamedPreset, 4> presets(int n_inputs) {
             small_preset(n_inputs)}}};
 }
 
-/// The paper's learning rule and rates for the paper's task: one-step Q-learning with alpha 0.5.
-/// The 61 torques share no units, and patterns have 200 units.
+/// The paper's learning rule and rates for the paper's task: one-step Q-learning with alpha 0.5,
+/// without averages of weights or a schedule. The 61 torques share no units, patterns have 200
+/// units, and ranges of observations that are far too wide are narrowed.
 inline QLambdaPreset paper_q_lambda_preset(int n_inputs) {
   return {.approximator = {.n_inputs = n_inputs,
                            .n_pattern_units = 200,

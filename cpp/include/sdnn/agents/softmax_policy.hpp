@@ -43,7 +43,9 @@ class SoftmaxPolicy {
   static constexpr std::int32_t kErrorOne = 1 << kErrorBits;
 
   /// Makes equal preferences for n_actions[d] actions of each dimension d, over codes of
-  /// `n_columns` columns of which about a quarter are not 0.
+  /// `n_columns` columns of which about a quarter are not 0. So many weights of 2^23 add up to a
+  /// preference of at least 2^(23 - 16 - 1) = 64. With more than 40 bits, the unit would be smaller
+  /// than that of the products by which `learn` moves weights.
   SoftmaxPolicy(std::vector<std::size_t> n_actions, std::size_t n_columns)
       : n_actions_(std::move(n_actions)),
         n_columns_(n_columns),

@@ -15,9 +15,9 @@ namespace {
 using HighBytes = std::map<std::pair<std::uint32_t, int>, int>;
 
 HighBytes listed(const HighByteLists& lists, std::size_t block) {
-  HighBytes listed;
-  for (const HighByte& high : lists.of(block)) listed[{high.column, high.unit}] = high.value;
-  return listed;
+  HighBytes high_bytes;
+  for (const HighByte& high : lists.of(block)) high_bytes[{high.column, high.unit}] = high.value;
+  return high_bytes;
 }
 
 // A list has the high bytes that are not 0, by column and unit. All changes are in block 1.

@@ -205,8 +205,8 @@ class LastStates {
   }
 
   /// Computes the state of an observation after the `last` one. If the agent has acted in the last
-  /// state, it belongs to the next step. Otherwise an equal observation is the same state, and any
-  /// other begins an episode.
+  /// state, the observation belongs to the next step. Otherwise an equal observation is the same
+  /// state, and any other begins an episode.
   void find(const Observations& observations, const LastState* last,
             std::span<const double> observation, LastState& next, Room& room) const {
     const bool is_same = last != nullptr && is_observation_of(*last, observation);

@@ -36,7 +36,7 @@ inline void Observer::refine(const RandomExperience& experience) {
 }
 
 /// The share of the changes of inputs that only the last changes explain: evidence of hidden
-/// velocities. Each half of the transitions predicts the other one.
+/// velocities. Each half of the transitions is predicted by a fit to the other one; see the class.
 inline double Observer::share_of_last_changes(const RandomExperience& experience) const {
   const Series series = coordinates_of(experience);
   std::vector<double> with, without, linear, changes, features;

@@ -63,7 +63,8 @@ inline void require_bytes(std::string_view sizes, std::string_view what, double 
   fail_for_size(sizes, message);
 }
 
-/// Returns n_per_dimension ^ n_dimensions if a table with `bytes_per_cell` for each is allowed.
+/// Returns n_per_dimension ^ n_dimensions if a table with `bytes_per_cell` for each cell is
+/// allowed.
 ///
 /// A grid grows exponentially with its dimensions. Call it before allocating, so that a grid that
 /// is too large causes an error instead of exhausting the memory. Requires n_per_dimension,

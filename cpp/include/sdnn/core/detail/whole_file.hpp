@@ -38,7 +38,8 @@ namespace sdnn::core {
 /// the system's error. On POSIX systems content and name are on the disk when `finish` returns.
 class WholeFile {
  public:
-  /// Opens a new temporary file beside `path`, or a device or pipe itself.
+  /// Opens a new temporary file beside `path`; a name in /dev or of an open descriptor is opened
+  /// itself.
   explicit WholeFile(const std::filesystem::path& path)
       : path_(path), partial_(path), is_special_(is_special(path)) {
     if (!is_special_) partial_ += partial_suffix();
@@ -106,7 +107,8 @@ class WholeFile {
     return folder == "/dev" || folder == "/dev/fd" || folder == "/proc/self/fd";
   }
 
-  /// Returns a suffix that nobody can predict, so that no two writers have the same temporary file.
+  /// Returns a random suffix, so that writers have different temporary files, whose names nobody
+  /// can predict.
   static std::string partial_suffix() {
     std::random_device random;
     std::string suffix = ".";

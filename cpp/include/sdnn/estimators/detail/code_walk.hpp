@@ -126,7 +126,7 @@ struct CodeWalk {
   std::vector<Step> steps;
   std::vector<std::uint16_t> step_of_sample;  ///< the step that leads to the code of each sample
 
-  /// The largest number of samples, which have at most as many steps, numbered in 16 bits.
+  /// The largest number of samples: the number of a step has 16 bits.
   static constexpr std::size_t kMostSamples = std::size_t{1} << 16;
   /// The largest number of bytes of the walks of all chunks of n_samples codes.
   static std::uint64_t bytes(std::uint64_t n_samples, std::uint64_t n_chunks,
