@@ -154,7 +154,9 @@ TEST(Imitation, RefusesToEndAWarmUpWithoutTransitionsOrTwice) {
   EXPECT_THROW(agent.end_warm_up_of_teacher(), std::invalid_argument);
 }
 
-TEST(Imitation, IsRefusedByControllersWithoutALinearReadout) {
+// Imitation moves the weights of single actions, which an RBF network over states and actions
+// lacks.
+TEST(Imitation, IsRefusedByControllersOfRBFNetworks) {
   ControllerConfig config =
       config_of(approximators::RBFNetworkConfig{.n_bases = 3}, QLearningConfig{});
   config.observation = {.low = {-1.0, -1.0}, .high = {1.0, 1.0}};

@@ -59,7 +59,7 @@ TEST(ProbabilityMixture, WeightsFollowADriftThatChangesTheBetterExpert) {
   EXPECT_GT(mixture.weights()[2], 0.98);
 }
 
-TEST(ProbabilityMixture, ProbabilitiesSumToOneForAnyNumbers) {
+TEST(ProbabilityMixture, ProbabilitiesArePositiveAndSumToOneForAnyNumbers) {
   ProbabilityMixture mixture(1);
   const Numbers extremes{0.0, 1.0, -kMax, kMax, 1e300, 5e-324, -3.0};
   for (std::size_t i = 0; i < 1000; ++i) {

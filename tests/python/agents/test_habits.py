@@ -233,6 +233,8 @@ def test_an_agent_counts_all_steps_that_it_has_learned(name, tmp_path):
     env = gym.make("Pendulum-v1")
     agent = AGENTS[name].agent(env, seed=1, observation_range="adaptive", warm_up_steps=200)
     assert agent.n_learned == 0
+    # Agents that learn on policy only fit ranges to the 200 steps of the warm-up: 150 + 100 - 200
+    # are learned. The others learn all steps.
     is_on_policy = name in ("fuzzy", "actor-critic")
     for n_more, n_learned in (
         (150, 0 if is_on_policy else 150),

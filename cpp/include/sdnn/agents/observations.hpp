@@ -84,7 +84,7 @@ class Observations {
   std::span<const double> high() const noexcept { return ranges_.high; }
   std::span<const ObservedInput> inputs() const noexcept { return inputs_; }
   std::size_t n_inputs() const noexcept { return inputs_.size(); }
-  /// Whether inputs are selected by relevance. One input, which may be repeated, or two are all
+  /// Whether inputs of little relevance may be left out. Where there are one or two inputs, all are
   /// kept.
   bool has_choice() const { return may_leave_out_inputs(pairs_); }
   /// Which inputs are angles.

@@ -106,8 +106,8 @@ class Acrobot {
     return result;
   }
 
-  // Advances the state by one decision interval or to the goal; returns whether it reached the
-  // goal.
+  // Advances the state by one decision interval, or less if it reaches the goal, where the joints
+  // may turn no faster than the limits. Returns whether it reached the goal.
   bool integrate(double torque, double goal_tolerance) noexcept {
     const double limit_1 = config().goal_velocity_1 * goal_tolerance;
     const double limit_2 = config().goal_velocity_2 * goal_tolerance;

@@ -64,7 +64,9 @@ class DualTraining {
     });
   }
 
-  /// Presents samples in order; the rule corrects the units after each of them.
+  /// Presents samples in order, a window at a time; the rule corrects the units after each of them.
+  /// `flush` adds the corrections that were delayed to all potentials, `synchronize` adds their
+  /// coefficients to the weights before these exceed 16 bits.
   template <class Rule>
   TrainingCount present(std::span<const std::int32_t> order, Rule& rule) {
     TrainingCount count;
@@ -72,7 +74,9 @@ class DualTraining {
         std::adjacent_find(order.begin(), order.end(), [](auto sample, auto next) {
           return next != sample + 1;
         }) == order.end();
-    // Corrections may be delayed where a window's part of their rows is contiguous.
+    // A correction changes the potentials of all samples by a row of inner products. Samples in the
+    // order of the data are contiguous there, so that a window can add the delayed corrections for
+    // itself, and the others wait for several windows.
     const std::size_t interval = in_data_order ? kFlushInterval : 1;
     for (std::size_t n_since_flush = 0; !order.empty(); n_since_flush += kWindow) {
       core::interruption_point();
