@@ -113,18 +113,12 @@ def value_of(text: str) -> object:
 
 
 def named_values(option: str, pairs: Iterable[str]) -> Iterator[tuple[str, str]]:
-    """Split texts like ``name=value``; UsageError for other texts, and for a name given twice."""
-    texts: dict[str, str] = {}
+    """Split texts like ``name=value``; UsageError that names the option for other texts."""
     for pair in pairs:
-        name, equals, text = (part.strip() for part in pair.partition("="))
-        if not equals or not name:
+        name, equals, text = pair.partition("=")
+        if not equals or not name.strip():
             raise click.UsageError(f"{option} must be NAME=VALUE, got {pair!r}")
-        if name in texts:
-            raise click.UsageError(
-                f"{option} {name} must be given once, got {texts[name]!r} and {text!r}"
-            )
-        texts[name] = text
-        yield name, text
+        yield name.strip(), text.strip()
 
 
 @contextmanager

@@ -46,8 +46,8 @@ def _options() -> list[click.Option]:
     for key in KEYS:
         schema: dict[str, Any] = {"$ref": "RunSpec"}
         for name in key.split("."):
-            alternatives = (schema, *schema.get("anyOf", ()))  # `anyOf`: a table that may be null
-            reference = next(part["$ref"] for part in alternatives if "$ref" in part)
+            schemes = (schema, *schema.get("anyOf", ()))  # `anyOf`: a table that may be null
+            reference = next(scheme["$ref"] for scheme in schemes if "$ref" in scheme)
             table = reference.rpartition("/")[2]
             schema = schemas[table]["properties"][name]
         types = (part for part in schema.get("anyOf", ()) if part.get("type") != "null")
@@ -168,7 +168,11 @@ def train(
 
 
 def _options_by_key(env_id: str | None, options: Options) -> Options:
-    """Return the values of options by keys of a specification; UsageError for a key set twice."""
+    """Return the values of options by keys of a specification, and remove those of KEYS.
+
+    UsageError for a key that two different options set. If an option is given twice, the last
+    value counts.
+    """
     from sdnn.runs.settings import KEYS_BY_NAME
 
     by_key = {key: options.pop(key.replace(".", "_")) for key in KEYS}
@@ -176,13 +180,12 @@ def _options_by_key(env_id: str | None, options: Options) -> Options:
     by_option = {key: (option_of(key), value) for key, value in values.items()}
 
     def set_once(option: str, key: str, value: object) -> None:
-        """Set `key` to the value of an option; refuse a key that is set already."""
-        if key in by_option:
-            other, before = by_option[key]
+        """Set `key` to the value of an option; refuse a key that another option has set."""
+        other, before = by_option.setdefault(key, (option, value))
+        if other != option:
             raise click.UsageError(
                 f"{option} must not set {key}, which {other} sets: got {value!r} and {before!r}"
             )
-        by_option[key] = option, value
         values[key] = value
 
     if env_id is not None:
