@@ -244,7 +244,7 @@ def probability_table(results, of_real):
         texts += [f"{mean(large, what):.3f}" for what in ("accuracy", "log_loss", "calibration")]
         rows.append((name, *texts, f"{mean(large, 'fit_s'):.2g}"))
     groups = (f"{len(MEASURED)} measured", f"{len(problems.CLASSIFICATION)} made", "100,000 rows")
-    columns = [f"{what}, {group}" for group in groups for what in ("log loss", "calibration error")]
+    columns = [f"{what}, {group}" for group in groups for what in ("log loss", "ECE")]
     columns.insert(4, "accuracy, 100,000 rows")
     return markdown(("model", *columns, "fit, s, 100,000 rows"), rows)
 

@@ -147,7 +147,8 @@ def draw_interval(axes, x, bounds):
 def draw_stream(axes):
     """Draw intervals of a stream whose noise is four times as strong after 1,500 samples."""
     random = np.random.default_rng(0)
-    model, bounds, targets = RiverRegressor(), [], []
+    network = SDNNRegressor(out_of_range="widen", random_state=0)
+    model, bounds, targets = RiverRegressor(network), [], []
     for t in range(3000):
         x = {"a": random.uniform(), "b": random.uniform()}
         y = x["a"] + random.normal(scale=0.1 if t < 1500 else 0.4)
