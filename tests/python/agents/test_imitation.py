@@ -197,10 +197,13 @@ def test_weights_after_imitation_are_those_of_the_numpy_transcription(
 ):
     learning = {"schedule_steps": 7, "bootstrap": "q_learning", "traces": "dutch"}
     agent = SDNNQLambda(
-        SQUARE, gym.spaces.Box(0.0, 1.0, (n_dimensions,), np.float64),
+        SQUARE,
+        gym.spaces.Box(0.0, 1.0, (n_dimensions,), np.float64),
         approximator=LinearSDNNConfig(**SMALL, action_window=window, n_actions=n_actions),
-        learning=QLambdaConfig(schedule_steps=7), seed=seed, **KNOWN,
-    )  # fmt: skip
+        learning=QLambdaConfig(schedule_steps=7),
+        seed=seed,
+        **KNOWN,
+    )
     sizes = [n_actions] * n_dimensions
     slow, margin = QLambda(Code(agent.readout.code, 2), sizes, window, learning), 0.1 * scale
     for state, action, value, _, _ in random_transitions(seed, 25, sizes, scale):

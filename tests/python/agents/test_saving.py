@@ -41,9 +41,14 @@ TWO_TORQUES = gym.spaces.Box(-2.0, 2.0, (2,), dtype=np.float32)
 BUTTONS = gym.spaces.Discrete(3, start=2)
 MIXED = gym.spaces.Dict({"at": PLANE, "lamp": gym.spaces.Discrete(2)})
 GENERAL = QLearningConfig(
-    n_steps=3, epsilon=0.3, final_epsilon=0.0, n_greedy_steps=0, max_action_repeat=6,
-    start_steps=15, value_range="adaptive",
-)  # fmt: skip
+    n_steps=3,
+    epsilon=0.3,
+    final_epsilon=0.0,
+    n_greedy_steps=0,
+    max_action_repeat=6,
+    start_steps=15,
+    value_range="adaptive",
+)
 RANDOMLY = replace(SMALL, rounding="random", averaging_interval=7)
 FALLING = QLearningConfig(learning_rate=1.0, final_learning_rate=0.2)
 TRACES = FuzzyQLearningConfig(trace_decay=0.7, n_greedy_steps=0, epsilon=0.3)

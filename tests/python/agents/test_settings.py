@@ -59,9 +59,13 @@ def actions_and_values(entry, n_dimensions, approximator, learning):
     """Return the actions of some steps, and values and greedy actions after them."""
     agent = entry.agent(
         gym.spaces.Box(0.0, 1.0, (3,), np.float64),
-        gym.spaces.Box(-1.0, 1.0, (n_dimensions,), np.float64), approximator=approximator,
-        learning=learning, seed=1, angle_pairs="none", inputs="all",
-    )  # fmt: skip
+        gym.spaces.Box(-1.0, 1.0, (n_dimensions,), np.float64),
+        approximator=approximator,
+        learning=learning,
+        seed=1,
+        angle_pairs="none",
+        inputs="all",
+    )
     random = np.random.default_rng(1)
     observation, actions = random.random(3), []
     for step in range(N_STEPS):

@@ -69,9 +69,12 @@ def test_a_training_with_normalizing_wrappers_resumes_exactly(wrappers, cut, tmp
     whole.run()
     env = wrapped(*wrappers)
     cut_training = Training(
-        agent_for(env), env, evaluation_env=wrapped(*wrappers),
-        callbacks=[Stop(cut, tmp_path / "training")], **options,
-    )  # fmt: skip
+        agent_for(env),
+        env,
+        evaluation_env=wrapped(*wrappers),
+        callbacks=[Stop(cut, tmp_path / "training")],
+        **options,
+    )
     cut_training.run()
     for callbacks in ([Stop(cut + 7, tmp_path / "training")], []):
         resumed = Training.load(

@@ -119,9 +119,13 @@ def test_sdnn_c_of_any_size_equals_its_transcription(
 ):
     n_active = 1 + round(window * (n_hidden_units - 1))
     config = _core.SDNNCConfig(
-        n_inputs=n_inputs, n_pattern_units=n_pattern_units, n_hidden_units=n_hidden_units,
-        n_active_units=n_active, lattice=lattice, initial_threshold=20.0,
-    )  # fmt: skip
+        n_inputs=n_inputs,
+        n_pattern_units=n_pattern_units,
+        n_hidden_units=n_hidden_units,
+        n_active_units=n_active,
+        lattice=lattice,
+        initial_threshold=20.0,
+    )
     compare_while_learning(config, seed, 30, 30)
 
 

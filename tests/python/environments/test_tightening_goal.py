@@ -80,9 +80,12 @@ def test_the_number_of_the_episode_reaches_the_schedule_through_other_wrappers()
 
 def test_environments_of_a_vector_have_separate_goals():
     envs = gym.make_vec(
-        ID, num_envs=2, vectorization_mode="sync", wrappers=[TighteningGoal],
+        ID,
+        num_envs=2,
+        vectorization_mode="sync",
+        wrappers=[TighteningGoal],
         config=AcrobotConfig(max_decisions=1),
-    )  # fmt: skip
+    )
     infos = envs.reset(options={"episode": 100})[1]
     assert infos["goal_tolerance"].tolist() == [0.5, 0.5]  # 1 / (1 + 100 / 100)
     envs.set_attr("episode", [300, 1])

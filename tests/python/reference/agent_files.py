@@ -34,13 +34,23 @@ OBSERVATIONS = gym.spaces.Box(
 GEARS = gym.spaces.Dict({"gear": gym.spaces.Discrete(3, start=1), "motion": OBSERVATIONS})
 TORQUE = gym.spaces.Box(-2.0, 3.0, (1,), dtype=np.float64)
 SMALL = SDNNCConfig(
-    n_pattern_units=12, n_anchor_patterns=4, n_interpolated=6, n_hidden_units=24, n_active_units=8,
-    n_actions=5, rounding="random",
-)  # fmt: skip
+    n_pattern_units=12,
+    n_anchor_patterns=4,
+    n_interpolated=6,
+    n_hidden_units=24,
+    n_active_units=8,
+    n_actions=5,
+    rounding="random",
+)
 LEARNING = QLearningConfig(
-    n_steps=3, epsilon=0.3, final_epsilon=0.0, final_learning_rate=0.25, n_greedy_steps=0,
-    max_action_repeat=6, value_range="adaptive",
-)  # fmt: skip
+    n_steps=3,
+    epsilon=0.3,
+    final_epsilon=0.0,
+    final_learning_rate=0.25,
+    n_greedy_steps=0,
+    max_action_repeat=6,
+    value_range="adaptive",
+)
 N_STEPS = 40
 
 
@@ -70,11 +80,14 @@ def agents():
     rules = {"approximator": FuzzyRulesConfig(n_sets=3, n_actions=4), "learning": fuzzy}
     q_lambda = {
         "approximator": LinearSDNNConfig(
-            n_pattern_units=20, n_anchor_patterns=4, n_interpolated=6, n_actions=5,
+            n_pattern_units=20,
+            n_anchor_patterns=4,
+            n_interpolated=6,
+            n_actions=5,
             averaging_interval=3,
         ),
         "learning": QLambdaConfig(epsilon=0.3, schedule_steps=50, max_action_repeat=6),
-    }  # fmt: skip
+    }
     settings = {
         "q-lambda": q_lambda | {"inputs": "relevant"},
         "q-lambda-vector": q_lambda | {"inputs": "all"},

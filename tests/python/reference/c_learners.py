@@ -97,9 +97,15 @@ def small_steps():
     paper = SDNNQLearning.presets["paper"].learning
     learning = replace(paper, learning_rate=0.3, tie_rule="lowest", n_steps=3)
     config = replace(
-        NETWORK, rounding="away", n_actions=7, u_low=0, u_high=20, q_low=0.0, q_high=1,
+        NETWORK,
+        rounding="away",
+        n_actions=7,
+        u_low=0,
+        u_high=20,
+        q_low=0.0,
+        q_high=1,
         weight_limit=5,
-    )  # fmt: skip
+    )
     return SDNNQLearning(
         box(np.pi, 2.0), box(1.0), seed=9, angles=[0], approximator=config, learning=learning
     )

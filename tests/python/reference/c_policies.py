@@ -107,10 +107,13 @@ def discrete_agent():
 def circular_agent():
     """An angle, ties within a tolerance, actions in double precision, averaged weights."""
     return SDNNQLearning(
-        box(np.pi, 8.0, 1.0), Box(-2.0, 2.0, (1,), np.float64),
+        box(np.pi, 8.0, 1.0),
+        Box(-2.0, 2.0, (1,), np.float64),
         approximator=replace(SMALL, n_actions=11, averaging_interval=20),
-        learning=learning(tie_rule="middle", tie_tolerance=0.3), angles=[0], seed=2,
-    )  # fmt: skip
+        learning=learning(tie_rule="middle", tie_tolerance=0.3),
+        angles=[0],
+        seed=2,
+    )
 
 
 def several_agent():
@@ -122,10 +125,13 @@ def several_agent():
 def pairs_agent():
     """A cosine and a sine, two torques, averaged weights."""
     return SDNNQLearning(
-        box(1.0, 1.0, 8.0), box(1.0, 3.0),
+        box(1.0, 1.0, 8.0),
+        box(1.0, 3.0),
         approximator=replace(SMALL, n_interpolated=8, n_anchor_patterns=6, averaging_interval=30),
-        learning=learning(tie_rule="lowest"), angle_pairs=[(0, 1)], seed=4,
-    )  # fmt: skip
+        learning=learning(tie_rule="lowest"),
+        angle_pairs=[(0, 1)],
+        seed=4,
+    )
 
 
 def lone_agent():

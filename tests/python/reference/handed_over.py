@@ -36,10 +36,13 @@ def transcribe(core: _core.SDNNC, **learning: Any) -> page.SDNNC:
     is_away = config.rounding == "away"
     network = object.__new__(RoundedAway if is_away else page.SDNNC)
     network.settings = page.Settings(
-        n_active_units=n_active, u_low=u_low,
-        u_high=n_active - u_low if config.u_high is None else config.u_high, q_low=config.q_low,
-        q_high=config.q_high, **learning,
-    )  # fmt: skip
+        n_active_units=n_active,
+        u_low=u_low,
+        u_high=n_active - u_low if config.u_high is None else config.u_high,
+        q_low=config.q_low,
+        q_high=config.q_high,
+        **learning,
+    )
     network.code_books = [core.table(mu) for mu in range(config.n_inputs)]
     network.permutations = {pair: core.permutation(*pair) for pair in core.pairs}
     network.weights = core.weights().astype(np.float32)

@@ -23,10 +23,14 @@ def make_record(trial=0, config="{}", steps=(50, 7), returns=None, **changes):
         solved=np.array(steps) < 50,
     )
     record = TrialRecord(
-        key=TrialKey("s4", "sdnn-c", trial, 2**63 - 1, hash_of(config)), config=config,
-        version="0.1", n_decisions=57, seconds=0.5, finished_at="2026-01-01T00:00:00+00:00",
+        key=TrialKey("s4", "sdnn-c", trial, 2**63 - 1, hash_of(config)),
+        config=config,
+        version="0.1",
+        n_decisions=57,
+        seconds=0.5,
+        finished_at="2026-01-01T00:00:00+00:00",
         rows=rows,
-    )  # fmt: skip
+    )
     return replace(record, **changes)
 
 

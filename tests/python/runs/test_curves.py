@@ -184,9 +184,12 @@ def test_names_of_groups_state_their_different_settings(tmp_path):
     }
     groups = groups_of([Run(tmp_path / name, *parts) for name, parts in goals.items()])
     assert [group.agent.removeprefix("sdnn-c general, ") for group in groups] == [
-        "600 steps, n_envs=1", "300 steps, n_envs=1", "300 steps, then 600 steps, n_envs=1",
-        "300 steps, then from 150 on 600 steps, n_envs=1", "300 steps, n_envs=4",
-    ]  # fmt: skip
+        "600 steps, n_envs=1",
+        "300 steps, n_envs=1",
+        "300 steps, then 600 steps, n_envs=1",
+        "300 steps, then from 150 on 600 steps, n_envs=1",
+        "300 steps, n_envs=4",
+    ]
 
 
 def test_later_goals_at_steps_that_depend_on_the_seed_keep_runs_grouped(tmp_path):

@@ -113,12 +113,15 @@ def test_the_outputs_of_a_study_with_hostile_names_are_harmless(study, name):
     )
     records = [
         make_record(
-            config=combination.spec.canonical_json(), key=key, version=name, finished_at=name,
+            config=combination.spec.canonical_json(),
+            key=key,
+            version=name,
+            finished_at=name,
             steps=[4] * 20,
         )
         for pair, combination in hostile.combinations.items()
         for key in hostile.keys(*pair)
-    ]  # fmt: skip
+    ]
     comparison = compare(hostile, records)
     _, svg = figure_bytes(draw_study(comparison, name))
     assert "script" not in {element.tag for element in ElementTree.fromstring(svg).iter()}

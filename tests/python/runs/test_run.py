@@ -86,9 +86,14 @@ def test_a_run_equals_the_training_of_its_configuration(whole, tmp_path):
         CONFIG.environment.make(stream) for stream in ("sensor_noise", "evaluation_sensor_noise")
     )
     training = Training(
-        CONFIG.make_agent(env), env, steps=400, seed=3, evaluate_every=90,
-        evaluation_env=evaluation_env, evaluation_episodes=2,
-    )  # fmt: skip
+        CONFIG.make_agent(env),
+        env,
+        steps=400,
+        seed=3,
+        evaluate_every=90,
+        evaluation_env=evaluation_env,
+        evaluation_episodes=2,
+    )
     rows = training.run().rows
     assert run.rows() == list(rows)
     training.agent.save(tmp_path / "agent.safetensors")

@@ -27,8 +27,11 @@ CART_POLE = EnvironmentSpec(id="CartPole-v1")
 
 FULL = RunSpec(
     environment=EnvironmentSpec(
-        id="CartPole-v1", kwargs={"max_episode_steps": 100},
-        ranges={"all": (-3.0, 3.0), "1": (-4.0, 4.0)}, noise=0.02, redundant=2,
+        id="CartPole-v1",
+        kwargs={"max_episode_steps": 100},
+        ranges={"all": (-3.0, 3.0), "1": (-4.0, 4.0)},
+        noise=0.02,
+        redundant=2,
     ),
     agent=AgentSpec(name="sdnn-c", preset="robust", warm_up_steps=50),
     learning={"discount": 0.95, "tie_rule": "middle"},
@@ -37,7 +40,7 @@ FULL = RunSpec(
     budget=BudgetSpec(episodes=30, target_return=450.0),
     seed=2**64 - 1,
     output=OutputSpec(checkpoint_every=70, tensorboard=True),
-)  # fmt: skip
+)
 
 
 @pytest.mark.parametrize(
@@ -159,9 +162,12 @@ def test_the_configuration_of_another_agent_is_refused():
 
 def test_angle_pairs_find_is_refused_with_noise():
     refuses(
-        "noise", RunSpec, environment=CART_POLE.replace(noise=0.1),
-        agent=AgentSpec(angle_pairs="find"), error=ConfigError,
-    )  # fmt: skip
+        "noise",
+        RunSpec,
+        environment=CART_POLE.replace(noise=0.1),
+        agent=AgentSpec(angle_pairs="find"),
+        error=ConfigError,
+    )
 
 
 def test_with_own_units_angle_pairs_can_be_declared_despite_noise():
