@@ -41,7 +41,7 @@ def _print_version(context: click.Context, _parameter: click.Parameter, value: b
 
 
 def _print_cmake_dir(context: click.Context, _parameter: click.Parameter, value: bool) -> None:
-    """Print where the CMake package is, then exit: the callback of ``--cmake-dir``."""
+    """Print where the CMake package is, then exit: the callback of ``--cmakedir``."""
     if not value:
         return
     import sdnn

@@ -46,8 +46,8 @@ def _options() -> list[click.Option]:
     for key in KEYS:
         schema: dict[str, Any] = {"$ref": "RunSpec"}
         for name in key.split("."):
-            schemes = (schema, *schema.get("anyOf", ()))  # `anyOf`: a table that may be null
-            reference = next(scheme["$ref"] for scheme in schemes if "$ref" in scheme)
+            alternatives = (schema, *schema.get("anyOf", ()))  # `anyOf`: a table that may be null
+            reference = next(part["$ref"] for part in alternatives if "$ref" in part)
             table = reference.rpartition("/")[2]
             schema = schemas[table]["properties"][name]
         types = (part for part in schema.get("anyOf", ()) if part.get("type") != "null")

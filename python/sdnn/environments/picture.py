@@ -106,7 +106,7 @@ class AcrobotPicture:
         self._draw_background(solved)
         self._draw_link(0j, elbow, _LINK_1)
         self._draw_link(elbow, tip, _LINK_2)
-        for centre, radius in ((0j, 0.075), (elbow, 0.065)):  # of the joints, in metres
+        for centre, radius in ((0j, 0.075), (elbow, 0.065)):  # radii of the joints, in metres
             self._disc(centre, radius, _INK)
             self._disc(centre, 0.55 * radius, _PAPER)
         self._disc(tip, 0.06, _GOAL if solved else _INK)

@@ -9,14 +9,16 @@ from numpy.typing import ArrayLike
 from sklearn.base import clone
 
 from sdnn.estimators.columns import Array, Floats
-from sdnn.estimators.training import FEWEST_SAMPLES, Rows, held_out_fifth, samples_in
+from sdnn.estimators.training import (
+    FEWEST_SAMPLES,
+    Rows,
+    TooFewSamplesError,
+    held_out_fifth,
+    samples_in,
+)
 
 if TYPE_CHECKING:
     from sdnn.estimators.base import BaseSDNN
-
-
-class CalibrationError(ValueError):
-    """An error for samples of which no fifth can be held out to calibrate."""
 
 
 class HeldOut(NamedTuple):
@@ -38,12 +40,13 @@ def learn_without_fifth(
 ) -> HeldOut:
     """Train a model like a fitted one without a fifth of the samples.
 
-    It has the same codings and pairs. A class of a single sample is not held out. CalibrationError
-    for fewer than ten samples, too few for early stopping, or too few of each class.
+    It has the same codings and pairs. A class of a single sample is not held out.
+    TooFewSamplesError for fewer than ten samples, too few for early stopping, or too few of each
+    class.
     """
     targets = np.asarray(y)
     if len(targets) < FEWEST_SAMPLES:
-        raise CalibrationError(
+        raise TooFewSamplesError(
             f"calibrate must be False with fewer than {FEWEST_SAMPLES} samples, got {len(targets)}"
         )
     seed = fitted._weight_seed
@@ -53,7 +56,9 @@ def learn_without_fifth(
         is_held &= ~np.isin(targets, labels[counts == 1])
         n_learned = len(targets) - np.count_nonzero(is_held)
         if not is_held.any() or n_learned < 2 * len(labels):
-            raise CalibrationError("calibrate must be False where classes have hardly two samples")
+            raise TooFewSamplesError(
+                "calibrate must be False where classes hardly have two samples"
+            )
     weights = np.ones(len(targets)) if sample_weight is None else np.asarray(sample_weight)
     model = clone(fitted).set_params(
         calibrate=False,
@@ -67,9 +72,6 @@ def learn_without_fifth(
         model._largest_full_sample = 0
     model._warns = False  # the fit to all samples has warned already
     learned, held = np.flatnonzero(~is_held), np.flatnonzero(is_held)
-    n_to_stop = round(model.validation_fraction * len(learned))
-    if model.early_stopping and n_to_stop >= len(learned):
-        raise CalibrationError("calibrate must be False with too few samples for early stopping")
     learned_weights = None if sample_weight is None else weights[learned]
     model.fit(samples_in(X, learned), targets[learned], learned_weights)
     weights_of_held = weights[held].astype(np.float64)

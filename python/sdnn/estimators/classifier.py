@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from contextlib import suppress
 from typing import Any, Self, cast
 
 import numpy as np
@@ -14,13 +15,18 @@ from sklearn.utils.multiclass import _ovr_decision_function, unique_labels
 
 from sdnn import _core
 from sdnn.estimators.base import BaseSDNN
-from sdnn.estimators.calibration import CalibrationError, HeldOut, learn_without_fifth
+from sdnn.estimators.calibration import HeldOut, learn_without_fifth
 from sdnn.estimators.columns import Array, Floats, Ints, Sample
 from sdnn.estimators.fitted import STEEPNESSES, mean_of
 from sdnn.estimators.inputs import CodedClassifier
 from sdnn.estimators.network import Network, Rule
 from sdnn.estimators.parameters import SHARE, documents, parameter, wholes, words
-from sdnn.estimators.training import class_weights, sample_weights, weighted_mean
+from sdnn.estimators.training import (
+    TooFewSamplesError,
+    class_weights,
+    sample_weights,
+    weighted_mean,
+)
 from sdnn.support.arguments import explains_names, require, shown
 
 UNITS_EACH = 60
@@ -92,35 +98,32 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
         super()._fit(X, y, sample_weight)
         self.__dict__.pop("steepness_", None)  # of an earlier fit
         labels = np.ravel(np.asarray(y))  # a column is also accepted
-        if self.calibrate or (self.calibrate is None and self._calibrates_by_default(len(labels))):
-            try:
-                held = learn_without_fifth(self, X, labels, sample_weight, is_stratified=True)
-                each = class_weights(self.class_weight, labels)
-                self.steepness_ = self._calibrated_steepness(held, each)
-            except CalibrationError:
-                if self.calibrate:
-                    raise
+        may_calibrate = self._has_several_units() and not self.warm_start
+        if self.calibrate:
+            self._calibrate(X, labels, sample_weight)
+        elif self.calibrate is None and may_calibrate and len(labels) <= MOST_CALIBRATED:
+            with suppress(TooFewSamplesError):
+                self._calibrate(X, labels, sample_weight)
 
-    def _calibrates_by_default(self, n_samples: int) -> bool:
-        """Return whether `fit` calibrates if the parameter is None."""
-        small = n_samples <= MOST_CALIBRATED
-        return small and self._has_several_units() and not self.warm_start
+    def _calibrate(self, X: ArrayLike, labels: Array, sample_weight: ArrayLike | None) -> None:
+        """Fit the steepness to samples that a second network has not learned."""
+        held = learn_without_fifth(self, X, labels, sample_weight, is_stratified=True)
+        by_class = class_weights(self.class_weight, labels)
+        self.steepness_ = self._calibrated_steepness(held, by_class)
 
-    def _calibrated_steepness(self, held: HeldOut, weights_by_class: Floats | None) -> float:
+    def _calibrated_steepness(self, held: HeldOut, by_class: Floats | None) -> float:
         """Return the steepness with the smallest log loss on samples that are held out.
 
-        ``weights_by_class`` are those of all samples.
+        ``by_class`` are the weights of all samples by their classes.
 
         Half a sample more has a random class, because a few samples may all be predicted rightly.
         """
         model = cast(SDNNClassifier, held.model)
         scores = model._scores(model._bins(held.X), self._n_threads())
         targets = model._targets(held.y)
-        weights = held.weights
-        if weights_by_class is not None:
-            weights = weights * weights_by_class[held.rows]
+        weights = held.weights if by_class is None else held.weights * by_class[held.rows]
         if not weights.any():
-            raise CalibrationError(
+            raise TooFewSamplesError(
                 "calibrate must be False where all samples that are held out have no weight"
             )
         share = 0.5 / (0.5 + float(weights.sum()))

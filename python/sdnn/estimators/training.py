@@ -73,18 +73,18 @@ def sample_weights(
     if weights is None:
         return None
     try:
-        checked = np.array(weights, dtype=np.float64)
+        numbers = np.array(weights, dtype=np.float64)
     except (TypeError, ValueError):
-        checked = np.array(np.nan)  # refused below, as no number in the range
-    checked = np.full(n_samples, checked) if checked.ndim == 0 else checked
-    fits = checked.shape == (n_samples,) and np.all((checked >= 0) & (checked <= LARGEST_WEIGHT))
+        numbers = np.array(np.nan)  # refused below, as no number in the range
+    numbers = np.full(n_samples, numbers) if numbers.ndim == 0 else numbers
+    fits = numbers.shape == (n_samples,) and np.all((numbers >= 0) & (numbers <= LARGEST_WEIGHT))
     expected = f"be a number in [0, {LARGEST_WEIGHT}] for each of {n_samples} samples"
     require(fits, name, expected, weights)
-    if not checked.any():
+    if not numbers.any():
         raise ValueError(f"{name} must be above zero for some sample, got zero for all")
-    if checked.sum() > MOST_PRESENTED:
-        raise ValueError(f"{name} must sum to at most {MOST_PRESENTED}, got {checked.sum():.4g}")
-    return checked
+    if numbers.sum() > MOST_PRESENTED:
+        raise ValueError(f"{name} must sum to at most {MOST_PRESENTED}, got {numbers.sum():.4g}")
+    return numbers
 
 
 def held_out_fifth(labels: Array, is_stratified: bool, seed: int) -> NDArray[np.bool_]:
@@ -186,16 +186,20 @@ def most_epochs(max_iter: int | None, n_samples: int) -> int:
     return min(MOST_EPOCHS, max(FEWEST_EPOCHS, MOST_PRESENTATIONS // n_samples))
 
 
+class TooFewSamplesError(ValueError):
+    """An error for samples of which none can be held out."""
+
+
 def held_out(share: float, random: np.random.RandomState, n_samples: int) -> tuple[Rows, Rows]:
     """Draw a share of the samples to hold out; return its rows and the other rows.
 
-    ValueError if either would be empty.
+    TooFewSamplesError if either would be empty.
     """
     if share == 0.0:
         return np.empty(0, dtype=np.int64), np.arange(n_samples)
     n_held = max(1, round(share * n_samples))
     if n_held >= n_samples:
-        raise ValueError(f"n_samples={n_samples} is too few for early stopping")
+        raise TooFewSamplesError(f"n_samples={n_samples} is too few for early stopping")
     order = random.permutation(n_samples)
     return np.sort(order[:n_held]), np.sort(order[n_held:])
 

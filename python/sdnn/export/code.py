@@ -38,7 +38,7 @@ class Code:
         for _, nu in pairs:
             ranks.append(n_before.get(nu, 0))
             n_before[nu] = ranks[-1] + 1
-        n_paired = len(pairs) // self.n_inputs // 2 * 2  # of each modifier
+        n_paired = len(pairs) // self.n_inputs // 2 * 2  # for each modifier
         order = sorted(
             range(len(pairs)), key=lambda g: (ranks[g] >= n_paired, pairs[g][1], ranks[g])
         )

@@ -246,8 +246,8 @@ def judge_claims(
     for claim in CLAIMS:
         checks = tuple(_judge_check(check, by_subject, costs) for check in claim.checks)
         outcome = ClaimOutcome(claim, checks)
-        checks = tuple(_judge_check(check, with_more_trials, ()) for check in claim.checks)
-        by_reference = ClaimOutcome(claim, checks)
+        reference_checks = (_judge_check(check, with_more_trials, ()) for check in claim.checks)
+        by_reference = ClaimOutcome(claim, tuple(reference_checks))
         if by_reference.verdict is not Verdict.NOT_RUN:
             outcome = replace(outcome, more=by_reference, chance=draws.chance(claim))
         outcomes.append(outcome)

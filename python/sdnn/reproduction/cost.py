@@ -185,7 +185,7 @@ def measure_steps(
     if n_learned:
         in_a_round = int(config.round_seconds * 1e9 / float(np.median(learning)))
     table_bytes = entry.table_bytes(approximator) if entry.table_bytes else 0
-    if in_a_round <= 1:  # steps so slow that each is a round, as many as time allows
+    if in_a_round <= 1:  # a single step fills a round
         n_slow = min(config.n_slow_rounds, int(config.slow_seconds / step_seconds))
         slow = _core.time_agent_steps(agent, n_slow, SEED + 2) if n_slow else first
         return tuple((slow / 1e3).tolist()), 1, table_bytes

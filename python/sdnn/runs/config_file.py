@@ -151,7 +151,7 @@ def spec_schema() -> Values:
     arguments = {name: {"$ref": f"#/$defs/{c.__name__}"} for name, c in PAPER_ARGUMENTS.items()}
     components["EnvironmentSpec"]["if"] = {"properties": {"id": {"const": PAPER_ACROBOT}}}
     components["EnvironmentSpec"]["then"] = {"properties": {"kwargs": {"properties": arguments}}}
-    for table in ("environment", "agent"):  # which a text may replace: its id or name
+    for table in ("environment", "agent"):  # a text may replace these tables: an id or a name
         inner = {
             name: properties[table].pop(name)
             for name in ("anyOf", "$ref")

@@ -355,8 +355,7 @@ class TrainingLoop(abc.ABC):
         due = [n - n % interval + interval for interval in intervals if interval]  # next multiples
         if n < self._n_until_long:
             due.append(self._n_until_long)  # `pieces` warns there that the training is long
-        due.append(2**62 if self.steps is None else self.steps)  # 2**62: practically never
-        self._next_call = min(due)
+        self._next_call = min([*due, 2**62 if self.steps is None else self.steps])  # 2**62: never
 
     @property
     def is_finished(self) -> bool:
@@ -394,7 +393,8 @@ class TrainingLoop(abc.ABC):
 
     def _episode_row(self, environment: int) -> Row:
         """Return the row of the episode that has ended in an environment."""
-        episode: Any = self._episodes.present[environment]
+        episode = self._episodes.present[environment]
+        assert episode is not None
         return self._row(
             "episode",
             episode=self.n_episodes,

@@ -241,7 +241,7 @@ TEST(FuzzyQLearning, RefusesInconsistentStates) {
   (void)agent.act(State{0.2, 0.3});
   testing::expect_that_damage_is_refused(agent);
   const core::State good = core::state_of(agent);
-  ASSERT_EQ(good.at("eligibilities").size(), 2U * 4);  // of two steps
+  ASSERT_EQ(good.at("eligibilities").size(), 2U * 4);  // two steps
   using testing::with_number;
   const auto refused = [&](const core::State& bad, const std::string& message) {
     testing::expect_refused(agent, bad, "state: " + message);

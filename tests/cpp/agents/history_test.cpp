@@ -212,7 +212,7 @@ TEST(History, ContinuesExactlyAfterItWasSavedAtAnyStep) {
   }
 }
 
-// Refused are any array of the history without its last element, and twice as many levels.
+// Any array of the history without its last element is refused, and so are twice as many levels.
 TEST(History, RefusesInconsistentStates) {
   const ControllerConfig config = config_of(History::observer);
   Controller controller(config);

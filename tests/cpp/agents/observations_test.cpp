@@ -202,7 +202,7 @@ TEST(Observations, AppendInputsThatAreAddedLaterAndRestoreThem) {
   for (const std::int32_t bad : {-1, 3, 5}) {
     testing::expect_refused(first, testing::with_number(good, "kept", bad), "state: kept");
   }
-  for (const std::uint64_t bad : {0U, 5U}) {  // of four kept inputs
+  for (const std::uint64_t bad : {0U, 5U}) {  // there are four kept inputs
     testing::expect_refused(first, testing::with_number(good, "n_first", bad), "state: n_first");
   }
   testing::expect_refused(first, testing::with_number<std::int32_t>(good, "kept", 4),

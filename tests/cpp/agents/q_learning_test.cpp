@@ -193,7 +193,7 @@ TEST(QLearning, StartStepsAreRandomAndLaterOnesGreedy) {
       n_repeated += action == last;
       last = action;
     }
-    EXPECT_EQ(n_repeated > 5, longest > 1);  // of 2^17 actions, only repeated ones are equal
+    EXPECT_EQ(n_repeated > 5, longest > 1);  // 2^17 actions: only repeated ones are equal
     agent.begin_episode();                   // ends the repetition of an action
     for (int i = 0; i < 20; ++i) EXPECT_EQ(agent.act(cell(0)), 5U);
   }

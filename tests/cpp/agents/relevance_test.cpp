@@ -92,7 +92,7 @@ TEST(Relevance, KeepsListedInputsAndThoseThatPredictThem) {
             (std::vector<bool>{true, true, false, false, false}));
 }
 
-// A reward if inputs 1 and 4 are both below or both above 1/2: neither tells anything alone.
+// A reward if inputs 1 and 4 are both below or both above 1/2: neither is informative alone.
 TEST(Relevance, FindsInputsThatMatterOnlyTogether) {
   int n_noise_kept = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
@@ -212,7 +212,7 @@ TEST(Relevance, JudgesTwoBinaryInputsSeparately) {
     EXPECT_TRUE(kept[0] && kept[2]) << seed;
     n_kept_by_chance += kept[1] ? 1 : 0;
   }
-  EXPECT_LE(n_kept_by_chance, 3);  // of 10
+  EXPECT_LE(n_kept_by_chance, 3);  // in ten seeds
 }
 
 TEST(BinaryGroups, ActionsSteerWhatTheyDecide) {

@@ -69,7 +69,7 @@ TEST(QLambda, RefineUnitMakesSmallerRewardsLearnable) {
   EXPECT_LT(value(0), 0x1p20);
   agent.learn(state, std::array{std::size_t{1}}, 1.0, state, true);
   EXPECT_GT(value(1), 0.1);
-  const auto exponent = agent.readout().exponent();  // of the unit, which is small enough now
+  const auto exponent = agent.readout().exponent();  // the unit's, which is small enough now
   agent.refine_unit(0, 0);
   EXPECT_EQ(agent.readout().exponent(), exponent);
 }

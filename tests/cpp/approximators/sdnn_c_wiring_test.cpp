@@ -96,7 +96,7 @@ TEST(SDNNC, TooLargeANetworkIsRefusedBeforeMemoryIsAllocated) {
                           .n_active_units = 20,
                           .max_table_bytes = 1 << 20};
   EXPECT_EQ(refusal(small), "no error");
-  SDNNCConfig smaller = small;  // the same network, with less memory than it needs
+  SDNNCConfig smaller = small;  // less memory than the network needs
   smaller.max_table_bytes = 1 << 16;
   EXPECT_NE(refusal(smaller), "no error");
 }

@@ -194,7 +194,8 @@ TEST(AcrobotTask, TruncatesAfterTheLastDecision) {
 }
 
 TEST(AcrobotTask, RefusesIntegrationStepsThatDoNotDivideTheDecisionInterval) {
-  for (const double bad : {0.03, 0.7, 2.0, 1e-7}) {  // of 1 second; 1e-7 are too many steps
+  for (const double bad :
+       {0.03, 0.7, 2.0, 1e-7}) {  // the interval is 1 second; 1e-7 are too many steps
     EXPECT_THROW(Acrobot({.integration_step = bad}), std::invalid_argument) << bad;
   }
 }

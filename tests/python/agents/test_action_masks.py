@@ -142,7 +142,7 @@ def test_targets_bootstrap_from_allowed_actions_only(agent_class):
         for action, value in ((-1, 0.0), (0, 8.0), (1, 2.0), (2, 0.0), (3, 0.0)):
             agent.learn(Transition(next_x, action, value, next_x, True))
             agent.begin_episode()
-    high, low = agent.q_values(next_x)[[1, 2]]  # of the actions 0 and 1; the first action is -1
+    high, low = agent.q_values(next_x)[[1, 2]]  # actions 0 and 1; the first one is -1
     assert high > low > 0.5
 
     def learned(mask):

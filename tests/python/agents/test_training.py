@@ -423,7 +423,7 @@ def test_a_training_stopped_after_a_failure_resumes_exactly(n_envs, tmp_path):
         assert loaded.run().is_finished
         return loaded
 
-    whole, cut = finished(stop=1000), finished(stop=150)  # of 200 steps: never, and once
+    whole, cut = finished(stop=1000), finished(stop=150)  # in 200 steps: never, and once
     assert states_equal(whole.agent, cut.agent)
     assert whole.next_episode == cut.next_episode
 

@@ -216,12 +216,12 @@ def test_a_refused_store_leaves_no_connection_open(tmp_path, monkeypatch, read_o
 def test_reading_rolls_back_a_journal_but_refuses_a_stray_one(tmp_path, read_only):
     path = make_store(tmp_path)
     expected, before = content_of(tmp_path), path.read_bytes()
-    journal = emptying_journal(path)  # of a transaction before which the file was empty
+    journal = emptying_journal(path)  # a transaction before which the file was empty
     with pytest.raises(StoreError, match="move it away"):
         ResultStore(tmp_path, read_only=read_only)
     assert path.read_bytes() == before
     journal.unlink()
-    hot_journal(path)  # that of a process killed while it wrote
+    hot_journal(path)  # left by a process killed while it wrote
     half_written = path.read_bytes()
     assert content_of(tmp_path, read_only=read_only) == expected
     # Only a store that may be written is rolled back in its file; otherwise a copy is.

@@ -204,7 +204,7 @@ def test_written_reference_results_are_read_unchanged(monkeypatch, tmp_path, fak
 
 
 def test_short_trials_are_refused_as_reference_results(fake_results):
-    short = replace(fake_results[0], last_episode=300)  # of case s4; the paper has 15,000
+    short = replace(fake_results[0], last_episode=300)  # in case s4; the paper has 15,000
     refuses("s4", script.reference_csv, [short], 7)
 
 

@@ -18,7 +18,7 @@ def episodes(steps):
 
 
 def measure(name, steps, returns=None):
-    """A measure of a trial that took so many steps in tests every 10 episodes."""
+    """A measure of a trial that took these numbers of steps in tests every 10 episodes."""
     steps = np.asarray(steps)
     returns = np.zeros(steps.size) if returns is None else np.asarray(returns)
     rows = TrialRows.of_tests(episodes(steps), steps, returns, steps < 50)

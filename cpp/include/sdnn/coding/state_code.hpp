@@ -107,7 +107,8 @@ class StateCode {
     core::require_below("unit", unit, n_columns());
     const std::size_t m = n_pattern_units();
     const std::size_t group = unit / m;
-    const std::size_t nu = groups_[group].modifier, modifier = permutations_[group][unit % m];
+    const std::size_t nu = groups_[group].modifier;
+    const std::size_t modifier = permutations_[group][unit % m];
     const std::size_t rank = ranks_[group];
     const std::size_t pair = rank / 2;
     if (pair == n_pairs()) return {false, n_double_columns() + nu * m + modifier, 0, 0};
@@ -122,7 +123,8 @@ class StateCode {
     const std::size_t width = code_.n_pair_words();
     for (std::size_t first = 0; first < 2 * n_inputs() * n_pairs() * width; first += 2 * width) {
       for (std::size_t w = first; w < first + width; ++w) {
-        const std::uint64_t first_sign = positive[w], second_sign = positive[w + width];
+        const std::uint64_t first_sign = positive[w];
+        const std::uint64_t second_sign = positive[w + width];
         const std::uint64_t unlike = first_sign ^ second_sign;
         active[w] ^= unlike;  // half of the sum where the signs are equal
         positive[w] = first_sign & second_sign;
@@ -165,7 +167,8 @@ class StateCode {
 
   /// For each group, the number of groups before it with the same modifier.
   std::vector<std::size_t> rank_groups() const {
-    std::vector<std::size_t> n_before(n_inputs(), 0), ranks;
+    std::vector<std::size_t> n_before(n_inputs(), 0);
+    std::vector<std::size_t> ranks;
     for (const InputPair& pair : groups_) ranks.push_back(n_before[pair.modifier]++);
     return ranks;
   }
