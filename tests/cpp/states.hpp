@@ -62,7 +62,7 @@ void expect_refused(Object& object, const core::State& bad, const std::string& m
 /// Expects that an object refuses its state with any one tensor missing, of another type, of
 /// another shape or cut, and with one more.
 template <class Object>
-void expect_that_damage_is_refused(Object& object) {
+void expect_damaged_states_refused(Object& object) {
   const core::State good = core::state_of(object);
   for (const auto& [name, tensor] : good) {
     core::State bad = good;

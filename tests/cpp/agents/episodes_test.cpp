@@ -54,7 +54,7 @@ TEST(Episodes, AreSavedWithTheNumberOfTheirEnvironmentAndRestored) {
   EXPECT_EQ(core::state_of(restored), state);
   core::restore(restored, core::state_of(Counting{}));
   EXPECT_EQ(restored.episodes.size(), 1U);
-  testing::expect_that_damage_is_refused(restored);
+  testing::expect_damaged_states_refused(restored);
 }
 
 TEST(Episodes, RefuseBadNumbersOfEnvironments) {

@@ -239,7 +239,7 @@ TEST(FuzzyQLearning, RefusesInconsistentStates) {
     agent.learn(state, action, 1.0, State{0.9, 0.1}, false);
   }
   (void)agent.act(State{0.2, 0.3});
-  testing::expect_that_damage_is_refused(agent);
+  testing::expect_damaged_states_refused(agent);
   const core::State good = core::state_of(agent);
   ASSERT_EQ(good.at("eligibilities").size(), 2U * 4);  // two steps
   using testing::with_number;

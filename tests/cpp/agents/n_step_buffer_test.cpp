@@ -106,7 +106,7 @@ TEST(NStepBuffer, VisitsEachPendingStepOnce) {
 TEST(NStepBuffer, RefusesInconsistentStates) {
   NStepBuffer steps = buffer_of(3);
   for (int i = 0; i < 2; ++i) add(steps, i);
-  testing::expect_that_damage_is_refused(steps);
+  testing::expect_damaged_states_refused(steps);
   using testing::with_number;
   const core::State good = core::state_of(steps);
   for (const double bad : {testing::kNaN, -0.1, 1.1}) {

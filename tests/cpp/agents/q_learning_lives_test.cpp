@@ -83,7 +83,7 @@ TEST(QLearning, RefusesInconsistentStatesOfEnvironments) {
   const std::vector<double> state = {0.5, 0.5};
   for (int t = 0; t < 20; ++t) (void)agent.act(state);  // until no random start step is left
   agent.learn(state, 0, 1.0, state, false, 2);
-  testing::expect_that_damage_is_refused(agent);
+  testing::expect_damaged_states_refused(agent);
   const core::State good = core::state_of(agent);
   const auto refused = [&](const core::State& bad, const std::string& message) {
     testing::expect_refused(agent, bad, "state: environment.2." + message);
@@ -114,7 +114,7 @@ TEST(QLearning, RefusesInconsistentStates) {
   }
   agent.set_learning_rate(std::nullopt);  // damage then includes these optional numbers
   agent.set_epsilon(std::nullopt);
-  testing::expect_that_damage_is_refused(agent);
+  testing::expect_damaged_states_refused(agent);
   const core::State good = core::state_of(agent);
   using testing::with_number;
   const auto refused = [&](const core::State& bad, const std::string& message) {

@@ -168,7 +168,7 @@ TEST(ReturnRange, RefusesInconsistentStates) {
   Stream environment(0.5);
   for (int i = 0; i < 1000; ++i) environment.note(8.0, i % 2 == 0);
   ReturnRange& range = environment.range;
-  testing::expect_that_damage_is_refused(range);
+  testing::expect_damaged_states_refused(range);
   const core::State good = core::state_of(range);
   const auto refused = [&](const core::State& bad, const std::string& name) {
     testing::expect_refused(range, bad, "state: " + name + " must be ");

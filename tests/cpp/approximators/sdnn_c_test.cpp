@@ -233,7 +233,7 @@ TEST(SDNNC, RefusesAStateThatDoesNotFit) {
                    .n_hidden_units = 12,
                    .n_active_units = 6},
                   1);
-  testing::expect_that_damage_is_refused(network);
+  testing::expect_damaged_states_refused(network);
   const core::State good = core::state_of(network);
   EXPECT_EQ(good.at("weights").shape, (std::vector<std::size_t>{12, 2 * 8}));  // units, columns
   // Weights beyond their limit of 16383, thresholds of 2^30 in size, and an empty or infinite

@@ -55,7 +55,7 @@ TEST(Pcg64, ContinuesFromItsState) {
   (void)random.below(5);  // a draw of 32 bits, so that half of 64 bits is left
   restore(restored, state_of(random));
   for (int i = 0; i < 9; ++i) EXPECT_EQ(random.below(1000), restored.below(1000));
-  testing::expect_that_damage_is_refused(random);
+  testing::expect_damaged_states_refused(random);
 }
 
 }  // namespace

@@ -135,7 +135,7 @@ TEST(Random, ContinuesFromItsState) {
 // A state of zeros gives only zeros, for which below(3) would not terminate.
 TEST(Random, RefusesAStateOfZeros) {
   Random random(1, Stream::weights);
-  sdnn::testing::expect_that_damage_is_refused(random);
+  sdnn::testing::expect_damaged_states_refused(random);
   auto bad = sdnn::core::state_of(random);
   for (std::byte& byte : bad.at("words").bytes) byte = std::byte{0};
   sdnn::testing::expect_refused(random, bad, "state: words must be not all 0");

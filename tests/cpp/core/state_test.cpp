@@ -86,7 +86,7 @@ TEST(State, RestoresEveryMember) {
 
 TEST(State, RefusesInconsistentTensorsAndChangesNothing) {
   Outer object;
-  testing::expect_that_damage_is_refused(object);
+  testing::expect_damaged_states_refused(object);
   const State good = state_of(object);
   testing::expect_refused(object, testing::with_number(good, "step", -1),
                           "state: step must be 0 or more");

@@ -91,7 +91,7 @@ TEST(WeightAverage, ForgetRestartsTheAverage) {
 TEST(WeightAverage, RefusesInconsistentStates) {
   const HiddenLayer layer(2, 3);
   WeightAverage average(layer, 3);
-  testing::expect_that_damage_is_refused(average);
+  testing::expect_damaged_states_refused(average);
   const core::State good = core::state_of(average);
   testing::expect_refused(average, testing::with_number(good, "fraction_bits", 15, 0),
                           "state: fraction_bits must be in [1, 14]");
