@@ -16,7 +16,7 @@ TEST(ActionCode, ThePaperHas601Windows) {
 }
 
 TEST(ActionCode, FewActionsHaveEvenlySpacedWindows) {
-  const ActionCode code(kUnits, kActiveUnits, /*n_actions=*/3);
+  const ActionCode code(kUnits, kActiveUnits, /*n_actions=*/3);  // starts are (900 - 300) / 2 apart
   for (const std::size_t action : {0U, 1U, 2U}) EXPECT_EQ(code.first_unit(action), 300 * action);
   EXPECT_EQ(ActionCode(10, 4, /*n_actions=*/1).first_unit(0), 0U);
 }

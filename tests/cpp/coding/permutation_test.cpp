@@ -12,7 +12,7 @@ PatternTable table(std::initializer_list<std::int8_t> signs) {
   return PatternTable::from_signs({signs.begin(), signs.size()}, 1, signs.size());
 }
 
-TEST(Permutation, MovesUnitPermutationOfKToUnitK) {  // units 2, 0, 1 of the pattern
+TEST(Permutation, UnitKOfAPermutedPatternIsUnitSigmaOfK) {  // sigma is (2, 0, 1)
   EXPECT_EQ(permuted(table({1, -1, -1}), {2, 0, 1}), table({-1, 1, -1}));
 }
 

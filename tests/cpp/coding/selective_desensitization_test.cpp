@@ -42,12 +42,13 @@ TEST(SelectiveDesensitization, KeepsThePatternWhereTheModifierIsOn) {
   EXPECT_EQ(positive[1], 0b0100U);  // 0 0 +1 -1
 }
 
+// The input's pattern +1 -1, desensitized by another of its patterns, +1 +1: both are active.
 TEST(SelectiveDesensitization, AcceptsASingleInput) {
   const SelectiveDesensitization code({table({1, -1}, 1)}, {table({1, 1}, 1)}, {{0, 0}});
   std::uint64_t active = 0, positive = 0;
   code.encode(std::array<std::int32_t, 1>{0}, &active, &positive);
-  EXPECT_EQ(active, 3U);
-  EXPECT_EQ(positive, 1U);
+  EXPECT_EQ(active, 0b11U);
+  EXPECT_EQ(positive, 0b01U);
 }
 
 // Inner products from the tables equal those of the codes, with shared and with separate modifiers.
@@ -81,6 +82,7 @@ TEST(SelectiveDesensitization, InnerProductsOfBinsEqualThoseOfCodes) {
   }
 }
 
+// Input 0 has one bin, input 1 has two; bins of two samples are checked.
 TEST(SelectiveDesensitization, RefusesBadBinsByIndex) {
   const SelectiveDesensitization code({table({1, -1}, 1)}, {table({1, 1, 1, 1}, 2)}, {{0, 1}});
   code.check_bins(std::array<std::int32_t, 4>{0, 1, 0, 0});

@@ -73,8 +73,7 @@ struct Wiring {
 
   StateCode code(int m, std::uint64_t seed) const { return small_code(l, m, seed, strides); }
   std::size_t n_partners() const { return strides.empty() ? l - 1 : strides.size(); }
-  /// Whether nu modifies mu.
-  bool has(std::size_t mu, std::size_t nu) const {
+  bool has_pair(std::size_t mu, std::size_t nu) const {  ///< whether input nu modifies input mu
     if (strides.empty()) return mu != nu;
     return std::ranges::find(strides, (nu + l - mu) % l) != strides.end();
   }
@@ -87,6 +86,7 @@ INSTANTIATE_TEST_SUITE_P(Inputs, StateCodeOfInputs,
                                            Wiring{6, {4}}, Wiring{5, {2, 3}}, Wiring{6, {1, 3, 4}},
                                            Wiring{4, {1, 2, 3}}, Wiring{6, {1, 2, 4, 5}}));
 
+// A column is unit k of x_mu where unit sigma(k) of x_nu is +1, and 0 where it is -1.
 TEST_P(StateCodeOfInputs, EqualsTheEquationOfLayer3) {
   const Wiring wiring = GetParam();
   const std::size_t l = wiring.l;
@@ -99,7 +99,7 @@ TEST_P(StateCodeOfInputs, EqualsTheEquationOfLayer3) {
   std::size_t j = 0;
   for (std::size_t mu = 0; mu < l; ++mu) {
     for (std::size_t nu = 0; nu < l; ++nu) {
-      if (!wiring.has(mu, nu)) {
+      if (!wiring.has_pair(mu, nu)) {
         EXPECT_THROW(static_cast<void>(code.permutation(mu, nu)), std::invalid_argument);
         continue;
       }
@@ -120,7 +120,7 @@ TEST_P(StateCodeOfInputs, EqualsTheEquationOfLayer3) {
 TEST_P(StateCodeOfInputs, ThePairedCodeHasHalfAsManyActiveColumns) {
   const std::size_t l = GetParam().l, k = GetParam().n_partners();
   const auto code = GetParam().code(37, 5);
-  EXPECT_EQ(code.n_double_columns(), 37U * l * (k - k % 2));
+  EXPECT_EQ(code.n_double_columns(), 37U * l * (k - k % 2));  // an odd partner stays unpaired
   std::vector<Bin> bins = {17, 200, 359, 0, 90, 123};
   bins.resize(l);
   const auto x = x_sd(code, bins);
@@ -131,15 +131,15 @@ TEST_P(StateCodeOfInputs, ThePairedCodeHasHalfAsManyActiveColumns) {
     if (x[j] != 0) n_active += code.columns_of(j).paired ? 1 : 2;
   }
   for (const auto* list : {&columns.plus, &columns.minus}) {
-    n_listed += list->size();
+    n_listed += list->size();  // columns that stand for two units come first
     EXPECT_TRUE(std::ranges::is_partitioned(
         *list, [&](std::uint32_t j) { return j < code.n_double_columns(); }));
   }
-  // A unit in a pair takes one of two columns, which it shares: half a column; an unpaired unit
-  // one.
+  // An active unit of a pair takes half a column, as it shares one; an unpaired unit takes one.
   EXPECT_EQ(2 * n_listed, n_active);
 }
 
+// Two paired units share two columns; an unpaired unit has a column of its own.
 TEST_P(StateCodeOfInputs, EveryColumnOfThePairedCodeStandsForOneOrTwoUnits) {
   const auto code = GetParam().code(13, 5);
   std::vector<int> n_uses(code.n_columns(), 0);
@@ -209,13 +209,13 @@ TEST(StateCode, RefusesBadPermutationsAndStrides) {
   EXPECT_NO_THROW(StateCode(tables, {{0, 1, 2}, {2, 1, 0}}));
   EXPECT_THROW(static_cast<void>(code.permutation(1, 1)), std::invalid_argument);
   const std::vector<PatternTable> three = {code.table(0), code.table(1), code.table(0)};
-  const std::vector<Permutation> one_each = {{0, 1, 2}, {2, 1, 0}, {1, 0, 2}};
-  EXPECT_NO_THROW(StateCode(three, one_each, {2}));
-  EXPECT_THROW(StateCode(three, one_each), std::invalid_argument);  // all pairs need six
-  EXPECT_THROW(StateCode(three, one_each, {0}), std::invalid_argument);
-  EXPECT_THROW(StateCode(three, one_each, {3}), std::invalid_argument);
-  EXPECT_THROW(StateCode(three, one_each, {2, 1}), std::invalid_argument);
-  EXPECT_THROW(StateCode(three, one_each, {1, 1}), std::invalid_argument);
+  const std::vector<Permutation> permutations = {{0, 1, 2}, {2, 1, 0}, {1, 0, 2}};
+  EXPECT_NO_THROW(StateCode(three, permutations, {2}));
+  EXPECT_THROW(StateCode(three, permutations), std::invalid_argument);  // all pairs need six
+  EXPECT_THROW(StateCode(three, permutations, {0}), std::invalid_argument);
+  EXPECT_THROW(StateCode(three, permutations, {3}), std::invalid_argument);
+  EXPECT_THROW(StateCode(three, permutations, {2, 1}), std::invalid_argument);
+  EXPECT_THROW(StateCode(three, permutations, {1, 1}), std::invalid_argument);
 }
 
 }  // namespace

@@ -13,10 +13,10 @@ PatternTable table_of(int n_symbols, int n_units, bool balanced, std::uint64_t s
 }
 
 TEST(SymbolPatterns, UnbalancedPatternsHaveIndependentUnits) {
-  core::Random same(6, core::Stream::code_books);
+  core::Random same_random(6, core::Stream::code_books);
   const PatternTable table = table_of(2, 70, false, 6);
   for (std::size_t symbol = 0; symbol < 2; ++symbol) {
-    for (std::size_t k = 0; k < 70; ++k) EXPECT_EQ(table[symbol][k], same.below(2) == 1);
+    for (std::size_t k = 0; k < 70; ++k) EXPECT_EQ(table[symbol][k], same_random.below(2) == 1);
   }
 }
 

@@ -11,7 +11,7 @@
 namespace sdnn::core {
 namespace {
 
-// Without exceptions: tests/python/core/test_compiler_options.py.
+// tests/python/core/test_compiler_options.py tests builds without exceptions.
 TEST(Fail, ThrowsItsArgumentWithTypeAndMessage) {
   const std::string message = "index must be below 3, got 4";
   EXPECT_EQ(testing::message_of<std::out_of_range>([&] { fail(std::out_of_range(message)); }),

@@ -13,7 +13,7 @@ namespace {
 
 using Seeds = std::vector<std::uint64_t>;
 
-struct Drawn {
+struct ExpectedDraws {
   Seeds seeds;
   std::array<std::uint32_t, 5> below_7;
   double uniform;
@@ -24,7 +24,7 @@ struct Drawn {
 // Expected numbers of numpy.random.Generator(PCG64(SeedSequence(seeds))): integers, random,
 // integers, raw.
 TEST(Pcg64, DrawsTheNumbersOfNumPy) {
-  const std::vector<Drawn> drawn = {
+  const std::vector<ExpectedDraws> drawn = {
       {{0}, {5, 4, 3, 1, 2}, 0.016527635528529094, 42963, 15002187965291974971U},
       {{5, 4294967296}, {6, 5, 3, 2, 6}, 0.4106650053839328, 718495, 17808439220834274975U},
       {{9223372036854775813U, 4294967297},
@@ -32,7 +32,7 @@ TEST(Pcg64, DrawsTheNumbersOfNumPy) {
        0.15769863079913804,
        739458,
        3353183172323727852U}};
-  for (const Drawn& expected : drawn) {
+  for (const ExpectedDraws& expected : drawn) {
     Pcg64 random(expected.seeds);
     for (const std::uint32_t number : expected.below_7) EXPECT_EQ(random.below(7), number);
     EXPECT_EQ(random.uniform(), expected.uniform);
@@ -50,7 +50,7 @@ TEST(Pcg64, DrawsTheWordsOfNumPysSeedSequence) {
   EXPECT_EQ(Pcg64::drawn_from(words), expected);
 }
 
-TEST(Pcg64, ContinuesFromItsState) {
+TEST(Pcg64, ContinuesFromItsStateAndRefusesDamagedOnes) {
   Pcg64 random(Seeds{1, 2}), restored(Seeds{3});
   (void)random.below(5);  // a draw of 32 bits, so that half of 64 bits is left
   restore(restored, state_of(random));

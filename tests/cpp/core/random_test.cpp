@@ -41,7 +41,7 @@ TEST(Random, StreamsAreUncorrelated) {
   int equal_bits = 0;
   for (int i = 0; i < 1000; ++i) equal_bits += 64 - std::popcount(weights.bits() ^ ties.bits());
   const double n_bits = 64.0 * 1000;
-  EXPECT_NEAR(equal_bits, n_bits / 2, 5 * std::sqrt(n_bits / 4));
+  EXPECT_NEAR(equal_bits, n_bits / 2, 5 * std::sqrt(n_bits / 4));  // five standard deviations
 }
 
 TEST(Random, UniformIsInTheHalfOpenUnitInterval) {
@@ -77,7 +77,7 @@ TEST(Random, BelowIsUniformAndWithinItsBound) {
   for (int i = 0; i < 100; ++i) EXPECT_LT(random.below(huge), huge);
 }
 
-TEST(Random, NormalConsumesOneDraw) {
+TEST(Random, ANormalNumberTakesOneDrawWhichDecidesItsSign) {
   Random normal(6, Stream::sensor_noise), bits(6, Stream::sensor_noise);
   for (int i = 0; i < 1000; ++i) {
     const double z = normal.normal();
@@ -133,7 +133,7 @@ TEST(Random, ContinuesFromItsState) {
 }
 
 // A state of zeros gives only zeros, for which below(3) would not terminate.
-TEST(Random, RefusesAStateOfZeros) {
+TEST(Random, RefusesDamagedStatesAndAStateOfZeros) {
   Random random(1, Stream::weights);
   sdnn::testing::expect_damaged_states_refused(random);
   auto bad = sdnn::core::state_of(random);

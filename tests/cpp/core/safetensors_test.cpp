@@ -16,7 +16,7 @@
 namespace sdnn::core {
 namespace {
 
-/// A file of this header and data.
+/// The content of a safetensors file: the header's length in 8 bytes, the header, the data.
 std::string file_of(const std::string& header, const std::string& data) {
   std::string length(8, '\0');
   for (std::size_t i = 0; i < 8; ++i) {
@@ -25,7 +25,8 @@ std::string file_of(const std::string& header, const std::string& data) {
   return length + header + data;
 }
 
-/// The header of a file without checksum, and its data.
+/// The header that the safetensors library writes for example_content() with the metadata "text",
+/// and its data.
 const std::string kHeader =
     R"({"__metadata__":{"sdnn":"text"},"b":{"dtype":"F64","shape":[1],"data_offsets":[0,8]},)"
     R"("a":{"dtype":"I16","shape":[2,1],"data_offsets":[8,12]},)"
@@ -46,7 +47,7 @@ detail::Safetensors parsed(const std::string& file) {
   return detail::parse_safetensors(file.size(), reader_of(file));
 }
 
-FileContent example() {
+FileContent example_content() {
   FileContent content{.kind = "agent", .description = {{"key", "text \"é\""}}, .tensors = {}};
   content.tensors["a"] = testing::tensor_of<std::int16_t>({1, -1});
   content.tensors["a"].shape = {2, 1};
@@ -58,28 +59,29 @@ FileContent example() {
   return content;
 }
 
-// The safetensors library orders tensors by the size of their type, larger ones first, then by
-// name.
+// Tensors are ordered by the size of their type, larger ones first, then by name. Our metadata
+// replaces "text" in kHeader; headers are padded to a multiple of 8 bytes.
 TEST(Files, HaveTheBytesOfTheSafetensorsLibrary) {
   const testing::Folder folder;
-  write_file(folder / "file", example());
+  write_file(folder / "file", example_content());
   const std::string file = testing::content_of(folder / "file");
-  const std::string digits = file.substr(detail::kChecksumBegin, 8);
+  const std::string checksum = file.substr(detail::kChecksumBegin, 8);
   std::string header = kHeader;
   header.replace(header.find("text"), 4,
-                 R"({\"checksum\":\")" + digits +
+                 R"({\"checksum\":\")" + checksum +
                      R"(\",\"description\":{\"key\":\"text \\\"\\u00e9\\\"\"},\"format\":1,)"
                      R"(\"kind\":\"agent\",\"version\":\")" +
                      kVersion + R"(\"})");
   header.append((8 - header.size() % 8) % 8, ' ');
   EXPECT_EQ(file, file_of(header, kData));
-  EXPECT_EQ(digits, detail::checksum_of(file.size(), reader_of(file)));
+  EXPECT_EQ(checksum, detail::checksum_of(file.size(), reader_of(file)));
   EXPECT_EQ(folder.n_files(), 1U);
 }
 
 TEST(Files, AreReadAsWritten) {
   const testing::Folder folder;
-  for (const FileContent& content : {example(), FileContent{.kind = "estimator", .tensors = {}}}) {
+  for (const FileContent& content :
+       {example_content(), FileContent{.kind = "estimator", .tensors = {}}}) {
     write_file(folder / "file", content);
     const FileContent read = read_file(folder / "file", {"agent", "estimator"});
     EXPECT_EQ(read.kind, content.kind);
@@ -165,7 +167,7 @@ TEST(Safetensors, InvalidFilesAreRefusedWithTheProblem) {
     return testing::runtime_error_of([&] { (void)parsed(file); });
   };
   EXPECT_EQ(error_of(file_of(kHeader, kData)), "no error");
-  const auto with = [&](const std::string& text, const std::string& replacement) {
+  const auto error_with = [&](const std::string& text, const std::string& replacement) {
     std::string header = kHeader;
     EXPECT_NE(header.find(text), std::string::npos) << text;
     return error_of(file_of(header.replace(header.find(text), text.size(), replacement), kData));
@@ -181,29 +183,29 @@ TEST(Safetensors, InvalidFilesAreRefusedWithTheProblem) {
   std::string many = "{\"a\":[1";
   for (int i = 0; i < 1000000; ++i) many += ",1";
   EXPECT_EQ(error_of(file_of(many + "]}", "")), "its JSON has too many values");
-  EXPECT_EQ(with("\"b\"", "\"a\""), "its JSON has \"a\" twice");
+  EXPECT_EQ(error_with("\"b\"", "\"a\""), "its JSON has \"a\" twice");
   EXPECT_EQ(error_of(file_of(kHeader, kData + "x")),
             "has 1 bytes after its last tensor, or lost one");
   EXPECT_EQ(error_of(file_of(kHeader, kData.substr(1))),
             "tensor c reaches beyond the end of the file");
-  EXPECT_EQ(with("F64", "F65"), "tensor b has a dtype that is not known");
-  EXPECT_EQ(with("\"F64\"", "64"), "tensor b has a dtype that is not known");
-  EXPECT_EQ(with("[0,8]", "[0,12]"), "tensor b is not as large as its shape");
-  EXPECT_EQ(with("[0,8]", "[8,0]"), "tensor b reaches beyond the end of the file");
-  EXPECT_EQ(with("[0,8]", "[0,18446744073709551615]"),
+  EXPECT_EQ(error_with("F64", "F65"), "tensor b has a dtype that is not known");
+  EXPECT_EQ(error_with("\"F64\"", "64"), "tensor b has a dtype that is not known");
+  EXPECT_EQ(error_with("[0,8]", "[0,12]"), "tensor b is not as large as its shape");
+  EXPECT_EQ(error_with("[0,8]", "[8,0]"), "tensor b reaches beyond the end of the file");
+  EXPECT_EQ(error_with("[0,8]", "[0,18446744073709551615]"),
             "tensor b reaches beyond the end of the file");
-  EXPECT_EQ(with("[0,8]", "[0,-8]"), "tensor b has no data_offsets of two numbers");
-  EXPECT_EQ(with("[0,8]", "[0,8,9]"), "tensor b has no data_offsets of two numbers");
-  EXPECT_EQ(with("[0,8]", "[4,12]"), "tensor b leaves a gap or overlaps another");
-  EXPECT_EQ(with("[8,12]", "[0,4]"), "tensor b leaves a gap or overlaps another");
-  EXPECT_EQ(with("[2,1]", "[2.0,1]"), "tensor a has no shape of numbers");
-  EXPECT_EQ(with("[2,1]", "[2,3]"), "tensor a is not as large as its shape");
-  EXPECT_EQ(with("[2,1]", "[0]"), "tensor a is not as large as its shape");
-  EXPECT_EQ(with("[2,1]", "[4294967296,4294967296,4294967296,4]"),
+  EXPECT_EQ(error_with("[0,8]", "[0,-8]"), "tensor b has no data_offsets of two numbers");
+  EXPECT_EQ(error_with("[0,8]", "[0,8,9]"), "tensor b has no data_offsets of two numbers");
+  EXPECT_EQ(error_with("[0,8]", "[4,12]"), "tensor b leaves a gap or overlaps another");
+  EXPECT_EQ(error_with("[8,12]", "[0,4]"), "tensor b leaves a gap or overlaps another");
+  EXPECT_EQ(error_with("[2,1]", "[2.0,1]"), "tensor a has no shape of numbers");
+  EXPECT_EQ(error_with("[2,1]", "[2,3]"), "tensor a is not as large as its shape");
+  EXPECT_EQ(error_with("[2,1]", "[0]"), "tensor a is not as large as its shape");
+  EXPECT_EQ(error_with("[2,1]", "[4294967296,4294967296,4294967296,4]"),
             "tensor a is not as large as its shape");
-  EXPECT_EQ(with("\"shape\":[1],", ""), "tensor b needs dtype, shape and data_offsets");
-  EXPECT_EQ(with("{\"sdnn\":\"text\"}", "[]"), "has no text \"sdnn\" in its __metadata__");
-  EXPECT_EQ(with("\"text\"", "3"), "has no text \"sdnn\" in its __metadata__");
+  EXPECT_EQ(error_with("\"shape\":[1],", ""), "tensor b needs dtype, shape and data_offsets");
+  EXPECT_EQ(error_with("{\"sdnn\":\"text\"}", "[]"), "has no text \"sdnn\" in its __metadata__");
+  EXPECT_EQ(error_with("\"text\"", "3"), "has no text \"sdnn\" in its __metadata__");
 }
 
 // Any damaged file is either read or refused by std::runtime_error, and never by another error.
@@ -220,7 +222,7 @@ TEST(Safetensors, DamagedFilesAreReadOrRefusedWithARuntimeError) {
     }
     n_refused += testing::runtime_error_of([&] { (void)parsed(bad); }) != "no error";
   }
-  EXPECT_GT(n_refused, static_cast<int>(good.size()) + 1000);  // all cut ones, most changed ones
+  EXPECT_GT(n_refused, static_cast<int>(good.size()) + 1000);  // all cut, most changed files
 }
 
 }  // namespace

@@ -45,6 +45,7 @@ struct Outer {
 
 using Names = std::vector<std::string>;
 
+// Outer has the numbers step = 3, is_on, list and grid, and the parts first and second.
 TEST(State, HasATensorForEveryMemberInOrderOfNames) {
   const State state = state_of(Outer{});
   Names names;
@@ -103,7 +104,7 @@ TEST(State, RefusesInconsistentTensorsAndChangesNothing) {
 }
 
 /// A number that may be missing, and parts that are numbered from 1.
-struct Sparse {
+struct OptionalParts {
   std::optional<double> limit;
   std::vector<Inner> others;
 
@@ -118,15 +119,15 @@ struct Sparse {
   }
 };
 
-TEST(State, OmitsMissingOptionalMembers) {
-  Sparse none;
+TEST(State, OmitsMissingOptionalMembersAndRestoresNumberedParts) {
+  OptionalParts none;
   EXPECT_TRUE(state_of(none).empty());
-  Sparse some{2.5, std::vector<Inner>(11)};
+  OptionalParts some{2.5, std::vector<Inner>(11)};
   some.others[9].value = 7.0;
   const State state = state_of(some);
-  EXPECT_EQ(state.size(), 12U);
+  EXPECT_EQ(state.size(), 1U + 11);  // the limit and 11 parts, other.1 to other.11
   EXPECT_EQ(testing::number_of<double>(state, "other.10.value"), 7.0);
-  Sparse restored{1.0, std::vector<Inner>(2)};
+  OptionalParts restored{1.0, std::vector<Inner>(2)};
   restore(restored, state);
   EXPECT_EQ(restored.limit, 2.5);
   EXPECT_EQ(state_of(restored), state);

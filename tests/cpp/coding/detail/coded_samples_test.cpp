@@ -20,6 +20,7 @@ SelectiveDesensitization small_code(std::size_t n_units) {
   return {{draw(), draw()}, {draw(), draw()}, {{0, 1}, {1, 0}}};
 }
 
+// A column is 0 where the modifier's pattern, the second one, is -1.
 TEST(CodedSamples, SignsAreAsWorkedByHand) {
   const SelectiveDesensitization code(
       {PatternTable::from_signs(std::vector<std::int8_t>{1, -1, 1}, 1, 3)},
@@ -49,8 +50,8 @@ TEST(CodedSamples, ProductsEqualThoseOfSigns) {
 }
 
 TEST(CodedSamples, CodesArePaddedToFourWords) {
-  const auto code = small_code(70);
-  const CodedSamples coded(code, std::vector<Bin>{0, 1, 2, 3});
+  const auto code = small_code(8);                               // a word for each of 2 pairs
+  const CodedSamples coded(code, std::vector<Bin>{0, 1, 2, 3});  // 2 samples of 2 inputs
   EXPECT_EQ(coded.size(), 2U);
   EXPECT_EQ(coded.n_words(), 4U);
   EXPECT_EQ(CodedSamples::bytes(code, 2), 2U * 2 * 4 * 8);  // samples, bits of two kinds, words

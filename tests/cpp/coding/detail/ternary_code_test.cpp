@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "estimators/codes.hpp"
@@ -12,6 +11,12 @@
 
 namespace sdnn {
 namespace {
+
+/// A code whose entries are all +1, or all -1.
+testing::Code full_code(std::size_t n_words, int entry) {
+  constexpr std::uint64_t kOnes = ~std::uint64_t{0};
+  return {std::vector(n_words, kOnes), std::vector(n_words, entry > 0 ? kOnes : 0)};
+}
 
 TEST(TernaryCode, InnerProductsAreExactForAnyNumberOfWords) {
   core::Random random(3, core::Stream::weights);
@@ -30,10 +35,7 @@ TEST(TernaryCode, InnerProductsAreExactForAnyNumberOfWords) {
 // Kernels count matches in bytes, which reach 8 * 31 of 255 at 124 words.
 TEST(TernaryCode, InnerProductsOfFullCodesDoNotOverflow) {
   for (const std::size_t n_words : {124U, 128U, 400U}) {
-    testing::Code on{std::vector<std::uint64_t>(n_words, ~std::uint64_t{0}),
-                     std::vector<std::uint64_t>(n_words, ~std::uint64_t{0})};
-    testing::Code off = on;
-    off.positive.assign(n_words, 0);
+    const testing::Code on = full_code(n_words, 1), off = full_code(n_words, -1);
     const auto all = static_cast<std::int32_t>(64 * n_words);
     testing::on_every_instruction_set([&](auto level) {
       EXPECT_EQ(coding::inner_product(on.words(), on.words(), n_words), all) << level;
@@ -42,7 +44,7 @@ TEST(TernaryCode, InnerProductsOfFullCodesDoNotOverflow) {
   }
 }
 
-/// Returns the sum of the columns for each entry of a code.
+/// The entries of a code: how often each column is listed as plus, minus how often as minus.
 std::vector<int> entries_of(const coding::ColumnLists& slots, std::size_t n_words) {
   std::vector<int> entries(64 * n_words);
   for (const std::uint32_t slot : slots.columns().plus) ++entries[slot];
@@ -50,6 +52,7 @@ std::vector<int> entries_of(const coding::ColumnLists& slots, std::size_t n_word
   return entries;
 }
 
+// A column whose entry changes by 2, from -1 to +1 or back, is listed twice.
 TEST(ColumnLists, ListTheChangesFromOneCodeToAnother) {
   core::Random random(5, core::Stream::weights);
   for (std::size_t n_words = 0; n_words < 9; ++n_words) {
@@ -79,10 +82,7 @@ TEST(ColumnLists, ListTheChangesFromOneCodeToAnother) {
 // From -1 to +1 each column rises by 2, and is listed twice.
 TEST(ColumnLists, HaveRoomForChangesOfEveryColumn) {
   const std::size_t n_words = 3;
-  testing::Code up{std::vector<std::uint64_t>(n_words, ~std::uint64_t{0}),
-                   std::vector<std::uint64_t>(n_words, ~std::uint64_t{0})};
-  testing::Code down = up;
-  down.positive.assign(n_words, 0);
+  const testing::Code up = full_code(n_words, 1), down = full_code(n_words, -1);
   testing::on_every_instruction_set([&](auto level) {
     coding::ColumnLists slots(n_words);
     slots.read_changes(down.words(), up.words());

@@ -2,20 +2,19 @@
 
 #include <gtest/gtest.h>
 
-#include <limits>
 #include <stdexcept>
 #include <vector>
 
 #include "errors.hpp"
+#include "states.hpp"
 
 namespace {
 
 using namespace sdnn::core;
 
+using sdnn::testing::kInfinity;
+using sdnn::testing::kNaN;
 using sdnn::testing::message_of;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 TEST(Require, StatesTheExpectedAndTheActualValue) {
   EXPECT_EQ(message_of([] { require(false, "n_bins", "even", 7); }), "n_bins must be even, got 7");

@@ -10,7 +10,7 @@ namespace sdnn::core {
 namespace {
 
 template <class Integer, class Wide>
-void check_register() {
+void expect_exact_sums_in_register() {
   constexpr std::size_t kSize = IntegerRegister<Integer>::kSize;
   static_assert(kSize * sizeof(Integer) == 32);
   std::vector<Integer> added(kSize), subtracted(kSize);
@@ -36,15 +36,15 @@ void check_register() {
 }
 
 TEST(IntegerRegister, AddsSubtractsAndWidens) {
-  check_register<std::int8_t, std::int16_t>();
-  check_register<std::int8_t, std::int32_t>();
-  check_register<std::int16_t, std::int32_t>();
-  check_register<std::int32_t, std::int32_t>();
+  expect_exact_sums_in_register<std::int8_t, std::int16_t>();
+  expect_exact_sums_in_register<std::int8_t, std::int32_t>();
+  expect_exact_sums_in_register<std::int16_t, std::int32_t>();
+  expect_exact_sums_in_register<std::int32_t, std::int32_t>();
 }
 
 TEST(IntegerRegister, WrapsAround) {
   constexpr std::int16_t kMost = std::numeric_limits<std::int16_t>::max();
-  const std::vector<std::int16_t> most(16, kMost);
+  const std::vector<std::int16_t> most(16, kMost);  // a register of 256 bits
   IntegerRegister<std::int16_t> sum;
   sum.load(most.data());
   sum.add(most.data());

@@ -44,7 +44,7 @@ TEST(Interruption, PassesOnWhetherToCheckImmediately) {
 TEST(Interruption, EndsTheGenerationOfPatterns) {
   Random random(1, Stream::code_books);
   const coding::AnchorConfig config{.n_units = 20, .n_anchor_patterns = 3, .n_interpolated = 4};
-  const StopAt stop(4);
+  const StopAt stop(4);  // counted from 0
   EXPECT_THROW(coding::anchor_patterns(config, random), StopError);
 }
 
@@ -67,7 +67,7 @@ TEST(Interruption, AStoppedStepEndsTheMovingEpisodesOfABatch) {
   std::vector<double> rewards(3);
   const environments::AcrobotBatchResults results{rewards, terminated, truncated};
   {
-    const StopAt stop(0);
+    const StopAt stop(0);  // at the first interruption point of the step
     EXPECT_THROW(batch.step(torques, tolerances, moving, results), StopError);
   }
   EXPECT_THROW(batch.step(torques, tolerances, moving, results), std::logic_error);

@@ -6,11 +6,11 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <vector>
 
 #include "sdnn/core/elementary.hpp"
 #include "sdnn/core/random.hpp"
+#include "states.hpp"
 
 namespace sdnn::core {
 namespace {
@@ -43,69 +43,62 @@ TEST(Lanes, UnrolledCountsUp) {
 TEST(Lanes, CalculateLaneByLane) {
   const std::array<double, 2> a{3.0, -0.5}, b{-2.0, -0.5};
   const auto x = Lanes<2>::load(a.data()), y = Lanes<2>::load(b.data());
-  const auto pair = [](const Lanes<2>& lanes) {
+  const auto lanes_of = [](const Lanes<2>& lanes) {
     std::array<double, 2> result;
     lanes.store(result.data());
     return result;
   };
-  using Pair = std::array<double, 2>;
-  EXPECT_EQ(pair(x + y), (Pair{1.0, -1.0}));
-  EXPECT_EQ(pair(x - y), (Pair{5.0, 0.0}));
-  EXPECT_EQ(pair(x * y), (Pair{-6.0, 0.25}));
-  EXPECT_EQ(pair(x / y), (Pair{-1.5, 1.0}));
-  EXPECT_EQ(pair(2.0 * x), (Pair{6.0, -1.0}));
-  EXPECT_EQ(pair(magnitude(y)), (Pair{2.0, 0.5}));
-  EXPECT_EQ(pair(double_of(bits_of(x))), a);
-  EXPECT_EQ(pair(select(x < 0.0, x, y)), (Pair{-2.0, -0.5}));
-  EXPECT_EQ(pair(select(true, x, y)), a);
-  EXPECT_EQ(pair(select(false, x, y)), b);
+  using TwoLanes = std::array<double, 2>;
+  EXPECT_EQ(lanes_of(x + y), (TwoLanes{1.0, -1.0}));
+  EXPECT_EQ(lanes_of(x - y), (TwoLanes{5.0, 0.0}));
+  EXPECT_EQ(lanes_of(x * y), (TwoLanes{-6.0, 0.25}));
+  EXPECT_EQ(lanes_of(x / y), (TwoLanes{-1.5, 1.0}));
+  EXPECT_EQ(lanes_of(2.0 * x), (TwoLanes{6.0, -1.0}));
+  EXPECT_EQ(lanes_of(magnitude(y)), (TwoLanes{2.0, 0.5}));
+  EXPECT_EQ(lanes_of(double_of(bits_of(x))), a);
+  EXPECT_EQ(lanes_of(select(x < 0.0, x, y)), (TwoLanes{-2.0, -0.5}));
+  EXPECT_EQ(lanes_of(select(true, x, y)), a);
+  EXPECT_EQ(lanes_of(select(false, x, y)), b);
 }
 
 TEST(Lanes, CompareIntoMasks) {
-  const std::array<double, 2> a{1.0, std::numeric_limits<double>::quiet_NaN()};
+  const std::array<double, 2> a{1.0, testing::kNaN};
   const auto x = Lanes<2>::load(a.data());
-  const auto pair = [](const LaneBits<2>& mask) {
+  const auto lanes_of = [](const LaneBits<2>& mask) {
     std::array<std::uint64_t, 2> result;
     mask.store(result.data());
     return result;
   };
-  using Pair = std::array<std::uint64_t, 2>;
-  EXPECT_EQ(pair(x < 2.0), (Pair{kOnes, 0}));
-  EXPECT_EQ(pair(x < 1.0), (Pair{0, 0}));
-  EXPECT_EQ(pair(x <= 1.0), (Pair{kOnes, 0}));
-  EXPECT_EQ(pair(x >= 1.0), (Pair{kOnes, 0}));
+  using TwoLanes = std::array<std::uint64_t, 2>;
+  EXPECT_EQ(lanes_of(x < 2.0), (TwoLanes{kOnes, 0}));
+  EXPECT_EQ(lanes_of(x < 1.0), (TwoLanes{0, 0}));
+  EXPECT_EQ(lanes_of(x <= 1.0), (TwoLanes{kOnes, 0}));
+  EXPECT_EQ(lanes_of(x >= 1.0), (TwoLanes{kOnes, 0}));
   EXPECT_TRUE(any(x <= 1.0));
   EXPECT_FALSE(any(x < 1.0));
-  const Pair right{0, kOnes}, all{kOnes, kOnes};
-  const auto second = LaneBits<2>::load(right.data()), every = LaneBits<2>::load(all.data());
+  const TwoLanes second_lane{0, kOnes}, both_lanes{kOnes, kOnes};
+  const auto second = LaneBits<2>::load(second_lane.data());
+  const auto every = LaneBits<2>::load(both_lanes.data());
   EXPECT_TRUE(any(second));
-  EXPECT_EQ(pair(both(every, second)), right);
-  EXPECT_EQ(pair(first_only(every, second)), (Pair{kOnes, 0}));
-  EXPECT_EQ(pair(every ^ second), (Pair{kOnes, 0}));
-  EXPECT_EQ(pair(every & 6), (Pair{6, 6}));
-  EXPECT_EQ(pair((every & 6) + 1), (Pair{7, 7}));
-  EXPECT_EQ(pair(8 - (every & 6)), (Pair{2, 2}));
-  EXPECT_EQ(pair((every & 6) << 2), (Pair{24, 24}));
+  EXPECT_EQ(lanes_of(both(every, second)), second_lane);
+  EXPECT_EQ(lanes_of(first_only(every, second)), (TwoLanes{kOnes, 0}));
+  EXPECT_EQ(lanes_of(every ^ second), (TwoLanes{kOnes, 0}));
+  EXPECT_EQ(lanes_of(every & 6), (TwoLanes{6, 6}));
+  EXPECT_EQ(lanes_of((every & 6) + 1), (TwoLanes{7, 7}));
+  EXPECT_EQ(lanes_of(8 - (every & 6)), (TwoLanes{2, 2}));
+  EXPECT_EQ(lanes_of((every & 6) << 2), (TwoLanes{24, 24}));
 }
 
-// Arguments of both signs and of sizes from 2^-22 to 2^17, at the limits of the range and beyond
-// it.
-TEST(Lanes, SinesKeepTheirBits) {
+// Arguments have both signs and sizes from 2^-22 to 2^17, or are at and beyond the range's limits.
+TEST(Lanes, SinesAndCosinesOfLanesHaveTheBitsOfThoseOfSingleNumbers) {
   Random random(1, Stream::exploration);
-  std::vector<double> arguments{0.0,
-                                -0.0,
-                                5e-324,
-                                kSinCosLimit,
-                                -kSinCosLimit,
-                                1.1e5,
-                                -1e300,
-                                std::numeric_limits<double>::infinity(),
-                                std::numeric_limits<double>::quiet_NaN(),
-                                kPi};
+  std::vector<double> arguments{0.0,           -0.0,  5e-324, kSinCosLimit,
+                                -kSinCosLimit, 1.1e5, -1e300, testing::kInfinity,
+                                testing::kNaN, kPi};
   for (int i = 0; i < 100000; ++i) {
     arguments.push_back(std::ldexp(2.0 * random.uniform() - 1.0, i % 40 - 22));
   }
-  const auto same = [](double a, double b) {
+  const auto equal_bits_or_nan = [](double a, double b) {
     return std::isnan(a) ? std::isnan(b)
                          : std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
   };
@@ -113,8 +106,8 @@ TEST(Lanes, SinesKeepTheirBits) {
     const auto lanes = sin_cos(Lanes<2>::load(&arguments[i]));
     for (std::size_t k = 0; k < 2; ++k) {
       const auto single = sin_cos(arguments[i + k]);
-      ASSERT_TRUE(same(lanes.sin.v[k], single.sin)) << arguments[i + k];
-      ASSERT_TRUE(same(lanes.cos.v[k], single.cos)) << arguments[i + k];
+      ASSERT_TRUE(equal_bits_or_nan(lanes.sin.v[k], single.sin)) << arguments[i + k];
+      ASSERT_TRUE(equal_bits_or_nan(lanes.cos.v[k], single.cos)) << arguments[i + k];
     }
   }
 }

@@ -24,7 +24,7 @@ TEST(WholeFile, AppearsWhenItIsFinished) {
     write(file, "");
     write(file, "two");
     EXPECT_EQ(testing::content_of(folder / "file"), "before");
-    EXPECT_EQ(folder.n_files(), 2U);
+    EXPECT_EQ(folder.n_files(), 2U);  // the old file and a temporary one
     file.finish();
     EXPECT_EQ(testing::content_of(folder / "file"), "one, two");
   }
@@ -45,7 +45,7 @@ TEST(WholeFile, ReplacesALink) {
     EXPECT_EQ(testing::content_of(folder / name), "after");
   }
   EXPECT_EQ(testing::content_of(folder / "target"), "before");
-  EXPECT_EQ(folder.n_files(), 3U);
+  EXPECT_EQ(folder.n_files(), 3U);  // target, link and dangling
 }
 
 TEST(WholeFile, WritesToADevice) {

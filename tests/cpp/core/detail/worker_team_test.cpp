@@ -30,6 +30,6 @@ TEST(WorkerTeam, RunOverCoversEveryItemOnce) {
   }
 }
 
-TEST(WorkerTeam, EndsWithoutWork) { WorkerTeam team(4); }
+TEST(WorkerTeam, CanBeDestroyedWithoutWork) { WorkerTeam team(4); }
 
 }  // namespace
