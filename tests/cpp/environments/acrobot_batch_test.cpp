@@ -2,9 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include <bit>
 #include <cstdint>
-#include <limits>
+#include <cstring>
 #include <stdexcept>
 #include <vector>
 
@@ -12,24 +11,22 @@
 #include "errors.hpp"
 #include "instruction_sets.hpp"
 #include "sdnn/core/random.hpp"
+#include "states.hpp"
 
 namespace sdnn::environments {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+using testing::kNaN;
 
-bool same_bits(const AcrobotState& a, const AcrobotState& b) {
-  for (Eigen::Index i = 0; i < 4; ++i) {
-    if (std::bit_cast<std::uint64_t>(a[i]) != std::bit_cast<std::uint64_t>(b[i])) return false;
-  }
-  return true;
+bool have_same_bits(const AcrobotState& a, const AcrobotState& b) {
+  return std::memcmp(a.data(), b.data(), 4 * sizeof(double)) == 0;
 }
 
 /// Arguments and results of a batch step, with the right sizes.
 struct Step {
   explicit Step(std::size_t n)
       : torques(n), tolerances(n, 1.0), moving(n, 1), rewards(n), terminated(n), truncated(n) {}
-  void of(AcrobotBatch& batch) {
+  void apply_to(AcrobotBatch& batch) {
     batch.step(torques, tolerances, moving, {rewards, terminated, truncated});
   }
 
@@ -39,9 +36,9 @@ struct Step {
   std::vector<std::uint8_t> terminated, truncated;
 };
 
-// Compares a batch with single acrobots, with random starts, torques and tolerances. A tenth of the
-// acrobots rests in each step; ended episodes begin again. Returns the number of episodes, or 0
-// after a difference, and adds the number of goals to `n_goals`.
+// Expects a batch to move like single acrobots, with random starts, torques and tolerances. A tenth
+// of the acrobots rests in each step; ended episodes begin again. Returns the number of episodes,
+// or 0 after a difference, and adds the number of goals to `n_goals`.
 int compare_with_single(const AcrobotConfig& config, std::size_t n, int n_steps, std::uint64_t seed,
                         int& n_goals) {
   core::Random random(seed, core::Stream::exploration);
@@ -65,14 +62,14 @@ int compare_with_single(const AcrobotConfig& config, std::size_t n, int n_steps,
       step.moving[i] = random.uniform() < 0.9;
       step.torques[i] = step.moving[i] ? 20.0 * random.uniform() - 10.0 : kNaN;
     }
-    step.of(batch);
+    step.apply_to(batch);
     for (std::size_t i = 0; i < n; ++i) {
       StepResult expected{0.0, false, false};
       if (step.moving[i]) expected = singles[i].step(step.torques[i], step.tolerances[i]);
       const bool is_same = step.rewards[i] == expected.reward &&
                            step.terminated[i] == expected.terminated &&
                            step.truncated[i] == expected.truncated &&
-                           same_bits(batch.state(i), singles[i].state()) &&
+                           have_same_bits(batch.state(i), singles[i].state()) &&
                            batch.tip_height(i) == singles[i].tip_height() &&
                            batch.decisions(i) == singles[i].decisions();
       EXPECT_TRUE(is_same) << "acrobot " << i << " of " << n << ", step " << s;
@@ -90,7 +87,7 @@ TEST(AcrobotBatch, HasTheBitsOfSingleAcrobotsOnEveryInstructionSet) {
     SCOPED_TRACE(level);
     int n_episodes = 0, n_goals = 0;
     for (const std::size_t n : {1u, 2u, 3u, 4u, 5u, 7u, 8u, 9u, 15u, 16u, 17u, 61u}) {
-      n_episodes += compare_with_single({}, n, 300, n, n_goals);
+      n_episodes += compare_with_single({}, n, /*n_steps=*/300, /*seed=*/n, n_goals);
     }
     EXPECT_GT(n_episodes, 1500);  // so that every end of an episode has been compared
     EXPECT_GT(n_goals, 750);
@@ -111,10 +108,10 @@ TEST(AcrobotBatch, HasTheBitsOfSingleAcrobotsWithOtherConfigurations) {
   sdnn::testing::on_every_instruction_set([&](auto level) {
     SCOPED_TRACE(level);
     int n_goals = 0;
-    EXPECT_GT(compare_with_single(config, 37, 200, 2, n_goals), 1000);
-    EXPECT_GT(n_goals, 100);
+    EXPECT_GT(compare_with_single(config, 37, /*n_steps=*/200, /*seed=*/2, n_goals), 1000);
+    EXPECT_GT(n_goals, 100);  // so that goals have been compared
     config.goal_test = GoalTest::every_step;
-    EXPECT_GT(compare_with_single(config, 37, 200, 2, n_goals), 1000);
+    EXPECT_GT(compare_with_single(config, 37, /*n_steps=*/200, /*seed=*/2, n_goals), 1000);
   });
 }
 
@@ -130,19 +127,21 @@ TEST(AcrobotBatch, AnOverflowDoesNotChangeTheOtherAcrobots) {
     Step step(5);
     step.torques.assign(5, 2.5);
     single.step(2.5, 1.0);
-    EXPECT_EQ(testing::message_of<std::overflow_error>([&] { step.of(batch); }),
+    EXPECT_EQ(testing::message_of<std::overflow_error>([&] { step.apply_to(batch); }),
               "the speed of acrobot 3 is too high for this integration_step");
-    EXPECT_TRUE(same_bits(batch.state(4), single.state()));
+    EXPECT_TRUE(have_same_bits(batch.state(4), single.state()));
     EXPECT_EQ(batch.decisions(4), 1);
-    EXPECT_THROW(step.of(batch), std::logic_error);  // the episode of acrobot 3 is over
+    EXPECT_THROW(step.apply_to(batch), std::logic_error);  // acrobot 3's episode is over
     batch.reset(3);
-    EXPECT_NO_THROW(step.of(batch));
+    EXPECT_NO_THROW(step.apply_to(batch));
   });
 }
 
 TEST(AcrobotBatch, RefusesBadArgumentsBeforeAnyAcrobotMoves) {
   AcrobotBatch batch({}, 3);
-  const auto message = [&batch](Step step) { return testing::message_of([&] { step.of(batch); }); };
+  const auto message = [&batch](Step step) {
+    return testing::message_of([&] { step.apply_to(batch); });
+  };
   Step step(3);
   step.torques[2] = 10.5;
   EXPECT_EQ(message(step), "torques[2] must be in [-10, 10], got 10.5");
@@ -174,9 +173,9 @@ TEST(AcrobotBatch, RefusesBadArgumentsBeforeAnyAcrobotMoves) {
 TEST(AcrobotBatch, AStepAllocatesNothing) {
   AcrobotBatch batch({}, 21);
   Step step(21);
-  step.of(batch);
+  step.apply_to(batch);
   const std::size_t before = testing::allocation_count();
-  step.of(batch);
+  step.apply_to(batch);
   EXPECT_EQ(testing::allocation_count(), before);
 }
 

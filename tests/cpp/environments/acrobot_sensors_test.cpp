@@ -3,9 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <vector>
+
+#include "states.hpp"
 
 namespace {
 
@@ -19,16 +20,17 @@ std::vector<double> observe(AcrobotSensors& sensors, const AcrobotState& state) 
   return out;
 }
 
-/// An observation with `config`, often written as {n_sensors, noise}.
+/// The first observation of new sensors.
 std::vector<double> observe(const SensorConfig& config, const AcrobotState& state) {
   AcrobotSensors sensors(config, 1, Stream::sensor_noise);
   return observe(sensors, state);
 }
 
 TEST(AcrobotSensors, AreNormalizedAsWorkedByHand) {
-  const auto rest = observe({6, 0.0}, {0.0, 0.0, 0.0, 0.0});
+  const auto rest = observe({.n_sensors = 6}, {0.0, 0.0, 0.0, 0.0});
   EXPECT_EQ(rest, (std::vector<double>{0.5, 0.5, 0.5, 0.5, 0.0, 0.0}));
-  const auto observation = observe({6, 0.0}, {kPi / 2.0, -kPi / 2.0, 1.5 * kPi, -2.5 * kPi});
+  const auto observation =
+      observe({.n_sensors = 6}, {kPi / 2.0, -kPi / 2.0, 1.5 * kPi, -2.5 * kPi});
   // Angles (x + pi) / (2 pi); speeds (v / limit + 1) / 2 with the limits 3 pi and 5 pi.
   EXPECT_DOUBLE_EQ(observation[0], 0.75);
   EXPECT_DOUBLE_EQ(observation[1], 0.25);
@@ -37,14 +39,14 @@ TEST(AcrobotSensors, AreNormalizedAsWorkedByHand) {
   EXPECT_DOUBLE_EQ(observation[4], 0.25);  // speeds: 2 ((3/4 - 1/2)^2 + (1/4 - 1/2)^2)
   EXPECT_DOUBLE_EQ(observation[5], 0.25);  // tip 1 m below joint 1: (2 - 0 - 1) / 4
   // Upright at -pi, which is the lower end of the angle, and with speeds beyond both limits.
-  const auto up = observe({6, 0.0}, {-kPi, 0.0, 100.0, -100.0});
+  const auto up = observe({.n_sensors = 6}, {-kPi, 0.0, 100.0, -100.0});
   EXPECT_EQ(up, (std::vector<double>{0.0, 0.5, 1.0, 0.0, 1.0, 1.0}));
 }
 
 TEST(AcrobotSensors, HeightIsTheNormalizedTipHeight) {
   for (double theta1 = -3.0; theta1 < 3.1; theta1 += 0.5) {
     for (double theta2 = -3.0; theta2 < 3.1; theta2 += 0.5) {
-      const auto observation = observe({6, 0.0}, {theta1, theta2, 0.0, 0.0});
+      const auto observation = observe({.n_sensors = 6}, {theta1, theta2, 0.0, 0.0});
       const double tip = -std::cos(theta1) - std::cos(theta1 + theta2);
       EXPECT_NEAR(observation[5], (tip + 2.0) / 4.0, 1e-15);
     }
@@ -53,7 +55,7 @@ TEST(AcrobotSensors, HeightIsTheNormalizedTipHeight) {
 
 TEST(AcrobotSensors, AnglesJustBelowPiAreBelowOne) {
   const double below_pi = std::nextafter(kPi, 0.0);
-  const auto observation = observe({4, 0.0}, {below_pi, below_pi, 0.0, 0.0});
+  const auto observation = observe({.n_sensors = 4}, {below_pi, below_pi, 0.0, 0.0});
   EXPECT_LT(observation[0], 1.0);
   EXPECT_LT(observation[1], 1.0);
 }
@@ -69,8 +71,8 @@ TEST(UnitInterval, WrappedNumbersKeepTheirFractionAndSaturatedOnesStopAtItsEnds)
 
 TEST(AcrobotSensors, NoiseIsOneNormalNumberPerSensorInOrder) {
   const AcrobotState state{0.3, -1.0, 2.0, -3.0};
-  const auto clean = observe({6, 0.0}, state);
-  AcrobotSensors sensors({6, 0.001}, 42, Stream::sensor_noise);
+  const auto clean = observe({.n_sensors = 6}, state);
+  AcrobotSensors sensors({.n_sensors = 6, .noise = 0.001}, 42, Stream::sensor_noise);
   sdnn::core::Random random(42, Stream::sensor_noise);
   for (int i = 0; i < 10; ++i) {
     const auto noisy = observe(sensors, state);
@@ -81,7 +83,7 @@ TEST(AcrobotSensors, NoiseIsOneNormalNumberPerSensorInOrder) {
 // The angle is -pi, where 0 and 1 meet; the speeds are beyond both limits, at 1 and at 0. Half of
 // the noise is negative, so it wraps or is clipped in about 1,000 of 2,000 observations.
 TEST(AcrobotSensors, NoiseWrapsAnglesAndClipsOtherSensors) {
-  AcrobotSensors sensors({6, 0.02}, 8, Stream::sensor_noise);
+  AcrobotSensors sensors({.n_sensors = 6, .noise = 0.02}, 8, Stream::sensor_noise);
   int low = 0, high = 0, floor = 0, ceiling = 0;
   for (int i = 0; i < 2000; ++i) {
     const auto observation = observe(sensors, {-kPi, 0.0, 100.0, -100.0});
@@ -100,8 +102,9 @@ TEST(AcrobotSensors, NoiseWrapsAnglesAndClipsOtherSensors) {
 
 TEST(AcrobotSensors, NoiseMayEnterBeforeRedundantVariablesAreComputed) {
   const AcrobotState state{0.3, -1.0, 2.0, -3.0};
-  AcrobotSensors basic({4, 0.02}, 42, Stream::sensor_noise);
-  AcrobotSensors all({6, 0.02, NoiseEntry::basic_sensors}, 42, Stream::sensor_noise);
+  AcrobotSensors basic({.n_sensors = 4, .noise = 0.02}, 42, Stream::sensor_noise);
+  AcrobotSensors all({.n_sensors = 6, .noise = 0.02, .noise_entry = NoiseEntry::basic_sensors}, 42,
+                     Stream::sensor_noise);
   for (int i = 0; i < 10; ++i) {
     const auto noisy = observe(basic, state);
     const auto observation = observe(all, state);
@@ -113,7 +116,7 @@ TEST(AcrobotSensors, NoiseMayEnterBeforeRedundantVariablesAreComputed) {
 
 TEST(AcrobotSensors, ConstantAndRandomInputsAreAppendedWithoutChangingOthers) {
   const AcrobotState state{0.3, -1.0, 2.0, -3.0};
-  AcrobotSensors without({5, 0.02}, 42, Stream::sensor_noise);
+  AcrobotSensors without({.n_sensors = 5, .noise = 0.02}, 42, Stream::sensor_noise);
   AcrobotSensors clean({.n_sensors = 4, .n_constant = 2, .n_random = 1}, 42, Stream::sensor_noise);
   AcrobotSensors random_only({.n_sensors = 5, .noise = 0.02, .n_random = 2}, 42,
                              Stream::sensor_noise);
@@ -131,11 +134,11 @@ TEST(AcrobotSensors, ConstantAndRandomInputsAreAppendedWithoutChangingOthers) {
   }
   AcrobotSensors constant({.n_sensors = 4, .noise = 0.02, .n_constant = 1}, 42,
                           Stream::sensor_noise);
-  EXPECT_NE(observe(constant, state)[4], 0.5);
+  EXPECT_NE(observe(constant, state)[4], 0.5);  // a constant input has noise, too
 }
 
 TEST(SensorNoise, RefusesNegativeAndNonFiniteSizes) {
-  for (const double bad : {-0.1, std::nan(""), std::numeric_limits<double>::infinity()}) {
+  for (const double bad : {-0.1, std::nan(""), sdnn::testing::kInfinity}) {
     EXPECT_THROW(SensorNoise(bad, {SensorEdge::wrap}, 1, Stream::sensor_noise),
                  std::invalid_argument);
   }

@@ -3,8 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <stdexcept>
+
+#include "states.hpp"
 
 namespace {
 
@@ -36,8 +37,7 @@ TEST(AcrobotState, WrapsItsAnglesOnly) {
 
 TEST(AcrobotState, RefusesNaNAndInfinity) {
   for (Eigen::Index i = 0; i < 4; ++i) {
-    for (const double bad :
-         {std::numeric_limits<double>::quiet_NaN(), -std::numeric_limits<double>::infinity()}) {
+    for (const double bad : {sdnn::testing::kNaN, -sdnn::testing::kInfinity}) {
       AcrobotState state = AcrobotState::Zero();
       state[i] = bad;
       EXPECT_THROW(wrapped(state), std::invalid_argument);

@@ -5,19 +5,19 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <stdexcept>
 
 #include "errors.hpp"
 #include "sdnn/core/random.hpp"
+#include "states.hpp"
 
 namespace {
 
 using namespace sdnn::environments;
 using sdnn::core::kPi;
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using sdnn::testing::kInfinity;
+using sdnn::testing::kNaN;
 
 TEST(AcrobotDynamics, KeepsItsEnergyWithoutTorque) {
   const AcrobotConfig config{.integration_step = 0.001};
@@ -98,48 +98,46 @@ TEST(AcrobotDynamics, KeepsItsBits) {
   EXPECT_EQ(digest, 12301352983019598016u);
 }
 
-// A decision ends after a second; 5 degrees are 0.087 rad.
+/// The reward of a decision without torque that begins at a state.
+double reward_from(const AcrobotState& state, const AcrobotConfig& config) {
+  Acrobot acrobot(config);
+  acrobot.set_state(state);
+  return acrobot.step(0.0, 1.0).reward;
+}
+
+// A decision ends after a second. Below 5 degrees, 0.087 rad, the acrobot counts as resting.
 TEST(AcrobotTask, PenalizesRestingAtTheDecisionInstant) {
   AcrobotConfig config;
   config.gravity = 0.0;      // drifts at constant speed
   config.goal_height = 3.0;  // out of reach
-  Acrobot acrobot(config);
-  EXPECT_EQ(acrobot.step(0.0, 1.0).reward, -5.0);
-  acrobot.set_state({0.2, 0.0, -0.2, 0.0});  // arrives at 0
-  EXPECT_EQ(acrobot.step(0.0, 1.0).reward, -5.0);
-  acrobot.set_state({-0.1, 0.0, 0.2, 0.0});  // passes 0, arrives beyond 5 degrees
-  EXPECT_EQ(acrobot.step(0.0, 1.0).reward, 0.0);
+  EXPECT_EQ(reward_from({0.0, 0.0, 0.0, 0.0}, config), -5.0);
+  EXPECT_EQ(reward_from({0.2, 0.0, -0.2, 0.0}, config), -5.0);  // arrives at 0
+  EXPECT_EQ(reward_from({-0.1, 0.0, 0.2, 0.0}, config), 0.0);   // passes 0, arrives at 0.1
   config.idle_angle = 0.0;
-  Acrobot never(config);
-  EXPECT_EQ(never.step(0.0, 1.0).reward, 0.0);
+  EXPECT_EQ(reward_from({0.0, 0.0, 0.0, 0.0}, config), 0.0);
   config.idle_angle = kPi / 5.0;  // 0.628
-  Acrobot wide(config);
-  wide.set_state({0.6, 0.0, 0.0, 0.0});
-  EXPECT_EQ(wide.step(0.0, 1.0).reward, -5.0);
-  wide.set_state({0.7, 0.0, 0.0, 0.0});
-  EXPECT_EQ(wide.step(0.0, 1.0).reward, 0.0);
+  EXPECT_EQ(reward_from({0.6, 0.0, 0.0, 0.0}, config), -5.0);
+  EXPECT_EQ(reward_from({0.7, 0.0, 0.0, 0.0}, config), 0.0);
 }
 
 TEST(AcrobotTask, PenalizesHighSpeedWithoutEndingTheEpisode) {
   AcrobotConfig config{.gravity = 0.0, .goal_height = 3.0};
   Acrobot acrobot(config);
   acrobot.set_state({1.0, 0.0, 9.5, 0.0});  // above the limit of 3 pi = 9.42
-  const auto fast_1 = acrobot.step(0.0, 1.0);
-  EXPECT_EQ(fast_1.reward, -5.0);
-  EXPECT_FALSE(fast_1.terminated || fast_1.truncated);
-  config.goal_velocity_1 = 1e6;
+  const auto result = acrobot.step(0.0, 1.0);
+  EXPECT_EQ(result.reward, -5.0);
+  EXPECT_FALSE(result.terminated || result.truncated);
+  config.goal_velocity_1 = 1e6;  // leaves the limit of joint 2, 5 pi
   Acrobot fast(config);
   fast.set_state({1.0, 0.0, -2.0, 40.0});
   const double reward = fast.step(0.0, 1.0).reward;
   EXPECT_GT(std::abs(fast.state()[3]), 5.0 * kPi);
   EXPECT_EQ(reward, -5.0);
   config.goal_velocity_2 = std::abs(fast.state()[3]);  // the limit itself is allowed
-  Acrobot limited(config);
-  limited.set_state({1.0, 0.0, -2.0, 40.0});
-  EXPECT_EQ(limited.step(0.0, 1.0).reward, 0.0);
+  EXPECT_EQ(reward_from({1.0, 0.0, -2.0, 40.0}, config), 0.0);
 }
 
-// The straight arm swings upwards and passes the goal height of 1.5 m.
+// The straight arm swings upwards and passes the goal height of 1.5 m; step(torque, tolerance).
 TEST(AcrobotTask, EndsAtTheInstantTheGoalIsReached) {
   Acrobot acrobot;
   acrobot.set_state({2.0, 0.0, 2.0, 0.0});
@@ -194,8 +192,7 @@ TEST(AcrobotTask, TruncatesAfterTheLastDecision) {
 }
 
 TEST(AcrobotTask, RefusesIntegrationStepsThatDoNotDivideTheDecisionInterval) {
-  for (const double bad :
-       {0.03, 0.7, 2.0, 1e-7}) {  // the interval is 1 second; 1e-7 are too many steps
+  for (const double bad : {0.03, 0.7, 2.0, 1e-7}) {  // of 1 s; steps of 1e-7 s would be too many
     EXPECT_THROW(Acrobot({.integration_step = bad}), std::invalid_argument) << bad;
   }
 }
@@ -218,7 +215,7 @@ TEST(AcrobotTask, RefusesSpeedsThatBreakTheIntegration) {
   Acrobot acrobot;
   acrobot.set_state({0.0, 0.0, 1e300, 0.0});
   EXPECT_THROW(acrobot.step(0.0, 1.0), std::overflow_error);
-  EXPECT_THROW(acrobot.step(0.0, 1.0), std::logic_error);
+  EXPECT_THROW(acrobot.step(0.0, 1.0), std::logic_error);  // the episode is over
   acrobot.reset();
   EXPECT_NO_THROW(acrobot.step(0.0, 1.0));
 }
