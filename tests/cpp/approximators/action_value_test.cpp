@@ -61,7 +61,7 @@ SDNNCConfig small_network() {
 // Checks that values and value agree, that reading them changes nothing, and that corrections move
 // the value to the target of 3.
 template <ActionValue Q>
-void expect_a_model(Q model) {
+void expect_pure_reads_and_reached_targets(Q model) {
   testing::WithWorkspace<Q> q(std::move(model));
   const std::array<double, 2> state = {0.2, 0.9};
   std::vector<double> row(q.n_actions()), again(q.n_actions());
@@ -76,13 +76,13 @@ void expect_a_model(Q model) {
 }
 
 TEST(ActionValue, EveryModelReadsWithoutChangeAndMovesToItsTarget) {
-  expect_a_model(testing::LookupTable(2, 4, 5));
-  expect_a_model(SDNNC(small_network(), 3));
-  expect_a_model(RBFNetwork({.n_inputs = 2, .n_actions = 5}));
+  expect_pure_reads_and_reached_targets(testing::LookupTable(2, 4, 5));
+  expect_pure_reads_and_reached_targets(SDNNC(small_network(), 3));
+  expect_pure_reads_and_reached_targets(RBFNetwork({.n_inputs = 2, .n_actions = 5}));
 }
 
 /// Random states; every third one repeats an earlier state.
-std::vector<std::array<double, 2>> some_states(std::size_t n) {
+std::vector<std::array<double, 2>> states_with_repetitions(std::size_t n) {
   core::Random random(3, core::Stream::sensor_noise);
   std::vector<std::array<double, 2>> states;
   for (std::size_t i = 0; i < n; ++i) {
@@ -95,8 +95,8 @@ std::vector<std::array<double, 2>> some_states(std::size_t n) {
 // Compares workspaces with new ones: `reading` is used often but not for updates, `rare` only after
 // thousands of updates, and another by a model and its copy.
 template <ActionValue Q>
-void expect_that_workspaces_follow(Q q) {
-  const auto states = some_states(40);
+void expect_workspaces_follow_updates(Q q) {
+  const auto states = states_with_repetitions(40);
   auto learning = q.workspace(), reading = q.workspace(), rare = q.workspace();
   std::vector<double> row(q.n_actions()), fresh(q.n_actions());
   const auto expect_fresh = [&](const Q& model, auto& workspace, const auto& state) {
@@ -121,9 +121,10 @@ void expect_that_workspaces_follow(Q q) {
   expect_fresh(copy, workspace_of_both, states[0]);
 }
 
+// Values do not depend on the workspace that reads them, new, used before updates, or of a copy.
 TEST(ActionValue, WorkspacesFollowTheUpdatesOfAModel) {
-  expect_that_workspaces_follow(SDNNC(small_network(), 3));
-  expect_that_workspaces_follow(RBFNetwork({.n_inputs = 2, .n_actions = 5}));
+  expect_workspaces_follow_updates(SDNNC(small_network(), 3));
+  expect_workspaces_follow_updates(RBFNetwork({.n_inputs = 2, .n_actions = 5}));
 }
 
 #ifndef NDEBUG
@@ -133,13 +134,12 @@ TEST(ActionValueDeathTest, AWorkspaceOfAnotherSizeIsRefused) {
   config.n_hidden_units += 8;
   auto foreign = SDNNC(config, 3).workspace();
   std::vector<double> row(network.n_actions());
-  EXPECT_DEATH(network.values(some_states(1)[0], foreign, row), "fits");
+  EXPECT_DEATH(network.values(states_with_repetitions(1)[0], foreign, row), "fits");
 }
 #endif
 
-// A correction at a rate is one at rate 1 towards (1 - rate) Q + rate target: the same bits.
 template <ActionValue Q>
-void expect_rates_as_defined(Q model) {
+void expect_corrections_at_rates_as_defined(Q model) {
   testing::WithWorkspace<Q> whole(model), at_a_rate(model);
   std::vector<double> row(whole.n_actions()), same(whole.n_actions());
   for (int i = 0; i < 100; ++i) {
@@ -160,11 +160,12 @@ void expect_rates_as_defined(Q model) {
   EXPECT_EQ(row, same);
 }
 
+// A correction at a rate has the bits of one at rate 1 towards (1 - rate) Q + rate target.
 TEST(ActionValue, EveryModelCorrectsAtARateLikeAtOneTowardsAMixedTarget) {
-  expect_rates_as_defined(testing::LookupTable(2, 4, 5));
-  expect_rates_as_defined(SDNNC(small_network(), 3));
-  expect_rates_as_defined(RBFNetwork({.n_inputs = 2, .n_actions = 5}));
-  expect_rates_as_defined(RBFNetwork({.n_inputs = 2, .n_bases = 3, .n_actions = 5}));
+  expect_corrections_at_rates_as_defined(testing::LookupTable(2, 4, 5));
+  expect_corrections_at_rates_as_defined(SDNNC(small_network(), 3));
+  expect_corrections_at_rates_as_defined(RBFNetwork({.n_inputs = 2, .n_actions = 5}));
+  expect_corrections_at_rates_as_defined(RBFNetwork({.n_inputs = 2, .n_bases = 3, .n_actions = 5}));
 }
 
 }  // namespace

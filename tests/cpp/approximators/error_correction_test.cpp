@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
-#include <string_view>
 
 #include "instruction_sets.hpp"
 #include "sdnn/core/random.hpp"
@@ -19,33 +18,34 @@ std::vector<std::uint32_t> select(std::vector<std::int32_t> potentials, int defi
 
 using Units = std::vector<std::uint32_t>;
 
-TEST(SelectUnits, SelectsNoneWithoutDeficit) { EXPECT_EQ(select({1, -1}, 0), Units{}); }
+TEST(SelectUnits, SelectsNoneWithoutDeficit) { EXPECT_EQ(select({1, -1}, /*deficit=*/0), Units{}); }
 
-// Seven units in three subsets, cut at floor(7i/3): {0,1}, {2,3}, {4,5,6}.
+// Three more units should fire: of seven one in each of three subsets, cut at floor(7 i / 3), which
+// are {0, 1}, {2, 3} and {4, 5, 6}.
 TEST(SelectUnits, SelectsTheNearestInactiveUnitOfEachSubset) {
-  EXPECT_EQ(select({-5, -3, 9, -8, -7, -2, -2}, 3), (Units{1, 3, 5}));
+  EXPECT_EQ(select({-5, -3, 9, -8, -7, -2, -2}, /*deficit=*/3), (Units{1, 3, 5}));
 }
 
 TEST(SelectUnits, SelectsTheNearestActiveUnitOfEachSubset) {
-  EXPECT_EQ(select({5, 3, -9, 8, 7, 2, 2}, -3), (Units{1, 3, 5}));
+  EXPECT_EQ(select({5, 3, -9, 8, 7, 2, 2}, /*deficit=*/-3), (Units{1, 3, 5}));
 }
 
 TEST(SelectUnits, SelectsNoneOfASubsetWithoutSuchAUnit) {
-  EXPECT_EQ(select({5, 3, 9, -8, 7, 2, 2}, 3), (Units{3}));  // the only inactive unit
-  EXPECT_EQ(select({5, 3, 9, 8}, 2), Units{});               // all units are active
+  EXPECT_EQ(select({5, 3, 9, -8, 7, 2, 2}, /*deficit=*/3), (Units{3}));  // the only inactive unit
+  EXPECT_EQ(select({5, 3, 9, 8}, /*deficit=*/2), Units{});               // all units are active
 }
 
 TEST(SelectUnits, CountsAPotentialOfZeroAsInactive) {
-  EXPECT_EQ(select({0, -1}, 1), (Units{0}));
-  EXPECT_EQ(select({0, 1}, -1), (Units{1}));
+  EXPECT_EQ(select({0, -1}, /*deficit=*/1), (Units{0}));
+  EXPECT_EQ(select({0, 1}, /*deficit=*/-1), (Units{1}));
 }
 
 TEST(SelectUnits, SelectsTheLowestIndexOfEqualDistances) {
-  EXPECT_EQ(select({-4, -4, -4}, 1), Units{0});
+  EXPECT_EQ(select({-4, -4, -4}, /*deficit=*/1), Units{0});
 }
 
 TEST(SelectUnits, SelectsAllWithOneSubsetPerUnit) {
-  EXPECT_EQ(select({-4, -40, -400}, 3), (Units{0, 1, 2}));
+  EXPECT_EQ(select({-4, -40, -400}, /*deficit=*/3), (Units{0, 1, 2}));
 }
 
 TEST(SelectUnits, SelectsTheSameUnitsOnEveryInstructionSet) {
@@ -58,7 +58,7 @@ TEST(SelectUnits, SelectsTheSameUnitsOnEveryInstructionSet) {
     }
     for (const int deficit : {1, -1, (size + 1) / 2, -size}) {
       const auto n = static_cast<std::size_t>(std::abs(deficit));
-      Units expected;
+      Units expected;  // by the definition: the nearest unit of each subset that can change
       for (std::size_t i = 0; i < n; ++i) {
         std::size_t best = potentials.size();
         const std::size_t end = (i + 1) * potentials.size() / n;

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "approximators/with_workspace.hpp"
 #include "errors.hpp"
 #include "sdnn/core/random.hpp"
 
@@ -22,7 +23,7 @@ FiredRules fire(const FuzzyRules& rules, const std::vector<double>& state) {
 TEST(FuzzyRules, TruthValuesAreAsWorkedByHand) {
   const FuzzyRules rules({.n_inputs = 2, .n_sets = 5, .n_actions = 3});
   EXPECT_EQ(rules.n_rules(), 25U);
-  // 0.25 (n_sets - 1) = 1: the centre of set 1. 0.8125 * 4 = 3.25: sets 3 and 4.
+  // 0.25 * 4 = 1: the centre of set 1. 0.8125 * 4 = 3.25: sets 3 and 4. Rules 5 * 1 + 3 and + 4.
   const FiredRules at_a_centre = fire(rules, {0.25, 0.8125});
   EXPECT_EQ(at_a_centre.rules, (std::vector<std::size_t>{8, 9}));
   EXPECT_EQ(at_a_centre.truth_values, (std::vector<double>{0.75, 0.25}));
@@ -37,9 +38,7 @@ TEST(FuzzyRules, TruthValuesOfDifferentRulesSumToOne) {
   for (const int d : {1, 2, 3, 4, 6}) {
     const FuzzyRules rules({.n_inputs = d, .n_sets = 2 + d, .n_actions = 2});
     for (int trial = 0; trial < 300; ++trial) {
-      std::vector<double> state(static_cast<std::size_t>(d));
-      for (double& x : state) x = random.uniform();
-      FiredRules fired = fire(rules, state);
+      FiredRules fired = fire(rules, testing::random_state(rules.n_inputs(), random));
       EXPECT_EQ(fired.size(), rules.max_fired());
       double total = 0.0;
       for (const double truth : fired.truth_values) {
@@ -47,14 +46,14 @@ TEST(FuzzyRules, TruthValuesOfDifferentRulesSumToOne) {
         total += truth;
       }
       EXPECT_NEAR(total, 1.0, 1e-15 * d);
-      std::sort(fired.rules.begin(), fired.rules.end());
+      std::sort(fired.rules.begin(), fired.rules.end());  // no rule fires twice
       EXPECT_EQ(std::adjacent_find(fired.rules.begin(), fired.rules.end()), fired.rules.end());
       EXPECT_LT(fired.rules.back(), rules.n_rules());
     }
   }
 }
 
-// The triangles written down: max(0, 1 - |x - centre| / spacing), multiplied over the inputs.
+// A rule's truth value is the product over inputs of max(0, 1 - |x - centre| / spacing).
 TEST(FuzzyRules, EqualProductsOfTrianglesOfAllRules) {
   const FuzzyRules rules({.n_inputs = 3, .n_sets = 4, .n_actions = 1});
   core::Random random(4, core::Stream::ties);
@@ -75,24 +74,23 @@ TEST(FuzzyRules, EqualProductsOfTrianglesOfAllRules) {
   }
 }
 
-std::string refusal(const FuzzyRulesConfig& config) {
+std::string size_error(const FuzzyRulesConfig& config) {
   return testing::message_of<std::length_error>([&] { FuzzyRules rules(config); });
 }
 
 // Each rule has 21 actions of 4 bytes.
 TEST(FuzzyRules, RefuseLargeTablesBeforeTheyAllocateMemory) {
   EXPECT_EQ(
-      refusal({.n_inputs = 9}),
+      size_error({.n_inputs = 9}),
       "n_sets or n_inputs must be smaller: a table of 9^9 = 387420489 rules needs 32543321076 "
-      "bytes, but max_table_bytes is "
-      "1073741824");
-  EXPECT_EQ(refusal({.n_inputs = 2, .max_table_bytes = 81 * 84 - 1}),
+      "bytes, but max_table_bytes is 1073741824");
+  EXPECT_EQ(size_error({.n_inputs = 2, .max_table_bytes = 81 * 84 - 1}),
             "n_sets or n_inputs must be smaller: a table of 9^2 = 81 rules needs 6804 bytes, but "
             "max_table_bytes is 6803");
-  EXPECT_EQ(refusal({.n_inputs = 2, .max_table_bytes = 81 * 84}), "no error");
+  EXPECT_EQ(size_error({.n_inputs = 2, .max_table_bytes = 81 * 84}), "no error");
 }
 
-TEST(FuzzyRules, RefuseBadStatesAndFireNoRules) {
+TEST(FuzzyRules, RefuseBadStatesAndKeepTheRulesThatFiredLast) {
   const FuzzyRules rules({.n_inputs = 2});
   FiredRules fired = fire(rules, {0.3, 0.4});
   const auto before = fired.rules;

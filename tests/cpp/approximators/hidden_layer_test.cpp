@@ -18,26 +18,37 @@ struct Input {
   operator coding::SignedColumns() const { return {plus, minus}; }
 };
 
-std::vector<std::int32_t> potentials(const HiddenLayer& p, const Input& input) {
-  std::vector<std::int32_t> h(p.n_units());
-  p.potentials(input, h);
+/// A quarter of the columns is +1, a quarter is -1.
+Input random_input(std::size_t n_columns, core::Random& random) {
+  Input input;
+  for (std::uint32_t j = 0; j < n_columns; ++j) {
+    const auto drawn = random.below(4);
+    if (drawn == 0) input.plus.push_back(j);
+    if (drawn == 1) input.minus.push_back(j);
+  }
+  return input;
+}
+
+std::vector<std::int32_t> potentials(const HiddenLayer& layer, const Input& input) {
+  std::vector<std::int32_t> h(layer.n_units());
+  layer.potentials(input, h);
   return h;
 }
 
 TEST(HiddenLayer, PotentialsAndCorrectionsAreAsWorkedByHand) {
-  HiddenLayer p(/*n_units=*/2, /*n_columns=*/3);
-  p.set_weight(0, 0, 2);
-  p.set_weight(0, 2, -1);
-  p.set_weight(1, 1, 5);
-  p.set_threshold(1, 4);
+  HiddenLayer layer(/*n_units=*/2, /*n_columns=*/3);
+  layer.set_weight(0, 0, 2);
+  layer.set_weight(0, 2, -1);
+  layer.set_weight(1, 1, 5);
+  layer.set_threshold(1, 4);
   const Input x{.plus = {0}, .minus = {2}};
-  EXPECT_EQ(potentials(p, x), (std::vector<std::int32_t>{2 + 1, -4}));
-  p.update(std::vector<std::uint32_t>{1}, x, 1);  // h_1 += |x|^2 + 1
-  EXPECT_EQ(potentials(p, x), (std::vector<std::int32_t>{3, -1}));
-  EXPECT_EQ(p.weight(1, 0), 1);
-  EXPECT_EQ(p.weight(1, 1), 5);
-  EXPECT_EQ(p.weight(1, 2), -1);
-  EXPECT_EQ(p.threshold(1), 3);
+  EXPECT_EQ(potentials(layer, x), (std::vector<std::int32_t>{2 + 1, -4}));
+  layer.update(std::vector<std::uint32_t>{1}, x, 1);  // potential 1 rises by |x|^2 + 1 = 3
+  EXPECT_EQ(potentials(layer, x), (std::vector<std::int32_t>{3, -1}));
+  EXPECT_EQ(layer.weight(1, 0), 1);
+  EXPECT_EQ(layer.weight(1, 1), 5);
+  EXPECT_EQ(layer.weight(1, 2), -1);
+  EXPECT_EQ(layer.threshold(1), 3);
 }
 
 // Random problems of many shapes, with weights on both sides of one byte, against plain sums.
@@ -48,167 +59,150 @@ TEST(HiddenLayer, PotentialsEqualPlainSumsOnRandomProblems) {
     const std::size_t n = 1 + random.below(problem % 10 == 0 ? 2500 : 200);
     const std::size_t columns = 1 + random.below(700);
     const std::int32_t largest = problem % 3 == 0 ? 3000 : 127;
-    HiddenLayer p(n, columns);
+    HiddenLayer layer(n, columns);
     for (std::size_t i = 0; i < n; ++i) {
-      p.set_threshold(i, static_cast<std::int32_t>(random.below(1000)) - 500);
+      layer.set_threshold(i, static_cast<std::int32_t>(random.below(1000)) - 500);
       for (std::size_t j = 0; j < columns; ++j) {
-        if (largest > 127 && random.below(50) != 0) continue;
-        p.set_weight(
-            i, j,
-            static_cast<std::int32_t>(random.below(static_cast<std::uint64_t>(2 * largest + 1))) -
-                largest);
+        if (largest > 127 && random.below(50) != 0) continue;  // only some weights are large
+        const auto drawn = random.below(static_cast<std::uint64_t>(2 * largest + 1));
+        layer.set_weight(i, j, static_cast<std::int32_t>(drawn) - largest);
       }
     }
     if (largest == 127) {
-      EXPECT_EQ(p.n_high_bytes(), 0U);
+      EXPECT_EQ(layer.n_high_bytes(), 0U);
     }
-    n_high_bytes += p.n_high_bytes();
-    Input x;
-    for (std::uint32_t j = 0; j < columns; ++j) {
-      switch (random.below(4)) {
-        case 0:
-          x.plus.push_back(j);
-          break;
-        case 1:
-          x.minus.push_back(j);
-          break;
-        default:
-          break;
-      }
-    }
+    n_high_bytes += layer.n_high_bytes();
+    const Input x = random_input(columns, random);
     std::vector<std::int32_t> expected(n);
     for (std::size_t i = 0; i < n; ++i) {
-      expected[i] = -p.threshold(i);
-      for (const auto j : x.plus) expected[i] += p.weight(i, j);
-      for (const auto j : x.minus) expected[i] -= p.weight(i, j);
+      expected[i] = -layer.threshold(i);
+      for (const auto j : x.plus) expected[i] += layer.weight(i, j);
+      for (const auto j : x.minus) expected[i] -= layer.weight(i, j);
     }
-    EXPECT_EQ(potentials(p, x), expected);
+    EXPECT_EQ(potentials(layer, x), expected);
 
     // A column may come twice.
     const auto last = static_cast<std::uint32_t>(columns - 1);
     const Input few{.plus = {0, 0}, .minus = {last}};
     for (std::size_t i = 0; i < n; ++i) {
-      expected[i] = -p.threshold(i) + 2 * p.weight(i, 0) - p.weight(i, last);
+      expected[i] = -layer.threshold(i) + 2 * layer.weight(i, 0) - layer.weight(i, last);
     }
-    EXPECT_EQ(potentials(p, few), expected);
+    EXPECT_EQ(potentials(layer, few), expected);
   }
   EXPECT_GT(n_high_bytes, 1000U);
 }
 
 TEST(HiddenLayer, AWeightBeyondAByteHasAHighByte) {
-  HiddenLayer p(3, 2);
+  HiddenLayer layer(3, 2);
   const Input x{.plus = {0}, .minus = {1}};
   const std::vector<std::uint32_t> unit = {2};
   for (int i = 1; i <= 500; ++i) {
-    p.update(unit, x, 1);
-    ASSERT_EQ(p.weight(2, 0), i);
-    ASSERT_EQ(p.weight(2, 1), -i);
-    ASSERT_EQ(p.threshold(2), -i);
-    ASSERT_EQ(potentials(p, x), (std::vector<std::int32_t>{0, 0, i - (-i) - (-i)}));
+    layer.update(unit, x, 1);
+    ASSERT_EQ(layer.weight(2, 0), i);
+    ASSERT_EQ(layer.weight(2, 1), -i);
+    ASSERT_EQ(layer.threshold(2), -i);
+    ASSERT_EQ(potentials(layer, x), (std::vector<std::int32_t>{0, 0, i - (-i) - (-i)}));
   }
-  EXPECT_EQ(p.n_high_bytes(), 2U);
-  for (int i = 500; i > 0; --i) p.update(unit, x, -1);
-  EXPECT_EQ(p.weight(2, 0), 0);
-  EXPECT_EQ(p.n_high_bytes(), 0U);
-  for (int i = 0; i > -500; --i) p.update(unit, x, -1);
-  EXPECT_EQ(p.weight(2, 0), -500);
-  EXPECT_EQ(p.weight(0, 0), 0);
+  EXPECT_EQ(layer.n_high_bytes(), 2U);
+  for (int i = 500; i > 0; --i) layer.update(unit, x, -1);
+  EXPECT_EQ(layer.weight(2, 0), 0);
+  EXPECT_EQ(layer.n_high_bytes(), 0U);
+  for (int i = 0; i > -500; --i) layer.update(unit, x, -1);
+  EXPECT_EQ(layer.weight(2, 0), -500);
+  EXPECT_EQ(layer.weight(0, 0), 0);
 }
 
-// A pass reads only the columns with high bytes if a block has few of them, else all columns.
+// A high byte is the second byte of a weight beyond [-127, 127]. A pass reads only the columns that
+// have one if a block of units has few of them, else all columns.
 TEST(HiddenLayer, FewAndManyHighBytesGiveTheSameSums) {
-  HiddenLayer p(/*n_units=*/130, /*n_columns=*/1000);
-  for (std::size_t j = 0; j < 1000; j += 3) p.set_weight(7, j, j % 2 == 0 ? 5000 : -5000);
-  p.set_weight(100, 6, 200);
-  p.set_weight(100, 7, -128);
-  EXPECT_EQ(p.n_high_bytes(), 334U + 2U);  // columns 0, 3 to 999 of unit 7; 6 and 7 of unit 100
+  HiddenLayer layer(/*n_units=*/130, /*n_columns=*/1000);
+  for (std::size_t j = 0; j < 1000; j += 3) layer.set_weight(7, j, j % 2 == 0 ? 5000 : -5000);
+  layer.set_weight(100, 6, 200);
+  layer.set_weight(100, 7, -128);
+  EXPECT_EQ(layer.n_high_bytes(), 334U + 2U);  // columns 0, 3 to 999 of unit 7; 6 and 7 of unit 100
   Input x{.plus = {0, 3, 6, 6, 999}, .minus = {1, 7, 9}};
-  const auto h = potentials(p, x);
+  const auto h = potentials(layer, x);
   EXPECT_EQ(h[7], 5000 - 5000 + 2 * 5000 - 5000 + 5000);
   EXPECT_EQ(h[100], 2 * 200 + 128);
   EXPECT_EQ(h[0], 0);
 }
 
-// Alternating corrections never need more than a byte, however often they happen.
+// Corrections of a unit by +x and -x in turns never need a second byte, however many they are.
 TEST(HiddenLayer, CorrectionsThatCancelStayInAByte) {
-  HiddenLayer p(70, 5);
+  HiddenLayer layer(70, 5);
   const Input x{.plus = {0, 3}, .minus = {4}};
   const std::vector<std::uint32_t> unit = {69};
-  for (int i = 0; i < 2000; ++i) p.update(unit, x, i % 2 == 0 ? 1 : -1);
-  EXPECT_EQ(p.n_high_bytes(), 0U);
-  EXPECT_EQ(p.weight(69, 3), 0);
+  for (int i = 0; i < 2000; ++i) layer.update(unit, x, i % 2 == 0 ? 1 : -1);
+  EXPECT_EQ(layer.n_high_bytes(), 0U);
+  EXPECT_EQ(layer.weight(69, 3), 0);
 }
 
 // The first ten columns are double: corrections count twice there.
 TEST(HiddenLayer, CorrectionsEqualPlainOnesAtAnySizeOfWeights) {
   constexpr std::size_t kUnits = 130;
   constexpr std::uint32_t kColumns = 40, kDouble = 10;
-  HiddenLayer p(kUnits, kColumns, kDouble);
+  HiddenLayer layer(kUnits, kColumns, kDouble);
   std::vector<std::array<std::int32_t, kColumns>> weights(kUnits);
   std::vector<std::int32_t> expected(kUnits);
   core::Random random(3, core::Stream::weights);
   for (int round = 0; round < 6000; ++round) {
-    Input x;
-    for (std::uint32_t j = 0; j < kColumns; ++j) {
-      const auto drawn = random.below(4);
-      if (drawn < 2) (drawn == 0 ? x.plus : x.minus).push_back(j);
-    }
+    const Input x = random_input(kColumns, random);
     std::vector<std::uint32_t> units;
     for (std::uint32_t unit = 0; unit < kUnits; ++unit) {
       if (random.below(20) == 0) units.push_back(unit);
     }
     const auto step = static_cast<std::int32_t>(random.below(13)) - 6;
-    p.update(units, x, step);
+    layer.update(units, x, step);
     for (const std::uint32_t unit : units) {
       for (const auto j : x.plus) weights[unit][j] += j < kDouble ? 2 * step : step;
       for (const auto j : x.minus) weights[unit][j] -= j < kDouble ? 2 * step : step;
     }
     if (round % 50 != 0) continue;
     for (std::size_t unit = 0; unit < kUnits; ++unit) {
-      expected[unit] = -p.threshold(unit);
+      expected[unit] = -layer.threshold(unit);
       for (const auto j : x.plus) expected[unit] += weights[unit][j];
       for (const auto j : x.minus) expected[unit] -= weights[unit][j];
     }
-    ASSERT_EQ(potentials(p, x), expected) << "round " << round;
+    ASSERT_EQ(potentials(layer, x), expected) << "round " << round;
   }
-  EXPECT_GT(p.n_high_bytes(), 0U);
-  EXPECT_LT(p.n_high_bytes(), kUnits * kColumns);
+  EXPECT_GT(layer.n_high_bytes(), 0U);
+  EXPECT_LT(layer.n_high_bytes(), kUnits * kColumns);
 }
 
 // The stored bound of a unit's weights grows with every correction; when it reaches the limit of a
 // byte it is computed anew from the weights.
 TEST(HiddenLayer, AWeightNearTheLimitOfAByteKeepsItsValueOverManyCorrections) {
-  HiddenLayer p(1, 2);
+  HiddenLayer layer(1, 2);
   const Input x{.plus = {0}, .minus = {}};
   const std::vector<std::uint32_t> unit = {0};
-  for (int i = 0; i < 200; ++i) p.update(unit, x, 1);
-  for (int i = 0; i < 100; ++i) p.update(unit, x, -1);
-  for (int i = 0; i < 10000; ++i) p.update(unit, x, i % 2 == 0 ? 2 : -2);
-  for (int i = 99; i >= -100; --i) {
-    p.update(unit, x, -1);
-    ASSERT_EQ(p.weight(0, 0), i);
+  for (int i = 0; i < 200; ++i) layer.update(unit, x, 1);
+  for (int i = 0; i < 100; ++i) layer.update(unit, x, -1);
+  for (int i = 0; i < 10000; ++i) layer.update(unit, x, i % 2 == 0 ? 2 : -2);
+  for (int i = 99; i >= -100; --i) {  // down from 200 - 100
+    layer.update(unit, x, -1);
+    ASSERT_EQ(layer.weight(0, 0), i);
   }
 }
 
 TEST(HiddenLayer, RefusesWeightsBeyondTheLimitAndChangesNothing) {
-  HiddenLayer p(2, 2);
+  HiddenLayer layer(2, 2);
   const Input x{.plus = {0}, .minus = {}};
   static_assert(HiddenLayer::kWeightLimit == 16383);
-  p.set_weight(1, 0, 16382);
+  layer.set_weight(1, 0, 16382);
   const std::vector<std::uint32_t> both = {0, 1};
-  p.update(both, x, 1);
-  EXPECT_EQ(p.weight(1, 0), 16383);
-  EXPECT_THROW(p.update(both, x, 1), std::overflow_error);
-  EXPECT_EQ(p.weight(1, 0), 16383);
-  EXPECT_EQ(p.weight(0, 0), 1);
-  EXPECT_EQ(p.threshold(0), -1);
-  p.update(both, x, -1);  // going back is possible
-  EXPECT_EQ(p.weight(1, 0), 16382);
+  layer.update(both, x, 1);
+  EXPECT_EQ(layer.weight(1, 0), 16383);
+  EXPECT_THROW(layer.update(both, x, 1), std::overflow_error);
+  EXPECT_EQ(layer.weight(1, 0), 16383);
+  EXPECT_EQ(layer.weight(0, 0), 1);
+  EXPECT_EQ(layer.threshold(0), -1);
+  layer.update(both, x, -1);  // going back is possible
+  EXPECT_EQ(layer.weight(1, 0), 16382);
 }
 
 TEST(HiddenLayer, ManyColumnsLowerTheWeightLimitSoThatPotentialsFit) {
-  const HiddenLayer p(1, std::size_t{1} << 20);
-  EXPECT_EQ(p.weight_limit(), 1023);  // 2^20 * 1023 < 2^30
+  const HiddenLayer layer(1, std::size_t{1} << 20);
+  EXPECT_EQ(layer.weight_limit(), 1023);  // 2^20 * 1023 < 2^30
 }
 
 TEST(HiddenLayer, AddingToAColumnEqualsSettingItsWeights) {
@@ -227,13 +221,10 @@ TEST(HiddenLayer, AddingToAColumnEqualsSettingItsWeights) {
     }
   }
   const Input x{.plus = {0, 2}, .minus = {1}};
-  std::vector<std::int32_t> of_added(130), of_set(130);
-  added.potentials(x, of_added);
-  set.potentials(x, of_set);
-  EXPECT_EQ(of_added, of_set);
+  EXPECT_EQ(potentials(added, x), potentials(set, x));
   EXPECT_EQ(added.n_high_bytes(), set.n_high_bytes());
   EXPECT_GT(added.n_high_bytes(), 0U);
-  std::fill(changes.begin(), changes.end(), 40000);
+  std::fill(changes.begin(), changes.end(), 40000);  // beyond the limit of a weight
   EXPECT_THROW(added.add_to_column(0, changes, 1), std::invalid_argument);
 }
 
@@ -241,9 +232,9 @@ TEST(HiddenLayer, RefusesBadSizesAndWeights) {
   EXPECT_THROW(HiddenLayer(0, 1), std::invalid_argument);
   EXPECT_THROW(HiddenLayer(1, 0), std::invalid_argument);
   EXPECT_THROW(HiddenLayer(1, 3, 4), std::invalid_argument);
-  HiddenLayer p(1, 1);
-  EXPECT_THROW(p.set_weight(0, 0, 40000), std::invalid_argument);
-  EXPECT_THROW(p.set_threshold(0, INT32_MAX), std::invalid_argument);
+  HiddenLayer layer(1, 1);
+  EXPECT_THROW(layer.set_weight(0, 0, 40000), std::invalid_argument);
+  EXPECT_THROW(layer.set_threshold(0, INT32_MAX), std::invalid_argument);
 }
 
 }  // namespace

@@ -27,14 +27,14 @@ TEST(OutputScale, TheInverseReturnsEveryCountWithinTheLimits) {
 }
 
 TEST(OutputScale, TheInverseRoundsHalvesUp) {
-  const OutputScale scale(0, 10, 0.0, 10.0);
+  const OutputScale scale(0, 10, 0.0, 10.0);  // 0 to 10 units for values from 0 to 10
   EXPECT_EQ(scale.inverse(2.5), 3);
   EXPECT_EQ(scale.inverse(2.4999), 2);
   EXPECT_EQ(scale.inverse(7.5), 8);
 }
 
 TEST(OutputScale, TheExactInverseIsNotRounded) {
-  const OutputScale scale(0, 10, 0.0, 10.0);
+  const OutputScale scale(0, 10, 0.0, 10.0);  // 0 to 10 units for values from 0 to 10
   EXPECT_EQ(scale.exact_inverse(2.25), 2.25);
   EXPECT_EQ(scale.exact_inverse(-3.0), 0.0);
   EXPECT_EQ(scale.exact_inverse(INFINITY), 10.0);

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <limits>
 #include <string>
 #include <vector>
 
@@ -15,35 +14,18 @@
 #include "sdnn/approximators/action_value.hpp"
 #include "sdnn/core/elementary.hpp"
 #include "sdnn/core/random.hpp"
+#include "states.hpp"
 
 namespace sdnn::approximators {
 namespace {
 
 static_assert(ActionValue<RBFNetwork>);
 
-using UsedRBF = testing::WithWorkspace<RBFNetwork>;
+using RBFWithWorkspace = testing::WithWorkspace<RBFNetwork>;
 
-std::vector<double> random_state(core::Random& random, std::size_t d) {
-  std::vector<double> state(d);
-  for (double& x : state) x = random.uniform();
-  return state;
-}
-
-/// A network with weights of several sizes and signs, learned from random targets.
-UsedRBF taught(const RBFNetworkConfig& config, int n_corrections) {
-  UsedRBF network(config);
-  core::Random random(7, core::Stream::weights);
-  for (int i = 0; i < n_corrections; ++i) {
-    const auto state = random_state(random, network.n_inputs());
-    const auto action = static_cast<std::size_t>(random.below(network.n_actions()));
-    network.update(state, action, 20.0 * random.uniform() - 10.0);
-  }
-  return network;
-}
-
-// d = 1, two bases at 0 and 1, width 1: at x = 0 Gaussians 1 and e^-1/2, at 1/2 equal ones.
+// An input with two bases at 0 and 1, of width 1: at 0 Gaussians 1 and e^-1/2, at 1/2 equal ones.
 TEST(RBFNetwork, AGradientStepIsAsWorkedByHand) {
-  UsedRBF network(
+  RBFWithWorkspace network(
       {.n_inputs = 1, .n_bases = 2, .n_actions = 3, .width = 1.0, .gradient_rate = 0.5});
   EXPECT_EQ(network.n_joint_bases(), 4U);
   const std::vector<double> state = {0.5};
@@ -62,25 +44,27 @@ TEST(RBFNetwork, AGradientStepIsAsWorkedByHand) {
   }
 }
 
-// Normalized bases: equal weights give that weight everywhere.
+// With equal weights of 5, sums over normalized bases are 5 everywhere.
 TEST(RBFNetwork, TheBasesSumToOne) {
   for (const double width : {0.1, 1.0, 100.0}) {
-    UsedRBF network({.n_inputs = 3, .n_actions = 11, .width = width});
-    network.set_weights(std::vector<double>(256, 5.0));  // 4^4: three inputs and the action
+    RBFWithWorkspace network({.n_inputs = 3, .n_actions = 11, .width = width});
+    network.set_weights(std::vector<double>(256, 5.0));  // 4^4 joint bases of 3 inputs, the action
     core::Random random(1, core::Stream::ties);
     std::vector<double> out(11);
     for (int i = 0; i < 100; ++i) {
-      const auto state = random_state(random, 3);
+      const auto state = testing::random_state(3, random);
       network.values(state, out);
       for (const double value : out) EXPECT_NEAR(value, 5.0, 1e-13);
     }
   }
 }
 
-// The sums are computed in the order of the weights, so that the bits are equal.
+// The weights' order is that of the bases of input 0, input 1 and the action; sums are computed in
+// this order, so that the bits are equal.
 TEST(RBFNetwork, ValuesAreSumsInTheOrderOfTheBases) {
   for (const int n_bases : {2, 3, 4, 7}) {
-    UsedRBF network = taught({.n_inputs = 2, .n_bases = n_bases, .n_actions = 9}, 100);
+    RBFWithWorkspace network = testing::trained_at_random<RBFWithWorkspace>(
+        RBFNetworkConfig{.n_inputs = 2, .n_bases = n_bases, .n_actions = 9}, 100);
     const std::vector<double> state = {0.25, 0.8};
     std::vector<double> out(9);
     network.values(state, out);
@@ -119,7 +103,7 @@ TEST(RBFNetwork, ValuesAreSumsInTheOrderOfTheBases) {
 // instruction set.
 TEST(RBFNetwork, KeepsItsBits) {
   const auto digest_of = [](const RBFNetworkConfig& config) {
-    UsedRBF network = taught(config, 200);
+    RBFWithWorkspace network = testing::trained_at_random<RBFWithWorkspace>(config, 200);
     std::uint64_t digest = 0;
     for (const double w : network.weights()) digest = digest * 31 + std::bit_cast<std::uint64_t>(w);
     std::vector<double> out(601);
@@ -134,7 +118,7 @@ TEST(RBFNetwork, KeepsItsBits) {
 
 TEST(RBFNetwork, AStepAllocatesNothing) {
   for (const int n_bases : {3, 4}) {
-    UsedRBF network({.n_inputs = 5, .n_bases = n_bases});
+    RBFWithWorkspace network({.n_inputs = 5, .n_bases = n_bases});
     const std::vector<double> state = {0.1, 0.2, 0.3, 0.4, 0.5};
     std::vector<double> out(601);
     const std::size_t before = testing::allocation_count();
@@ -145,31 +129,30 @@ TEST(RBFNetwork, AStepAllocatesNothing) {
   }
 }
 
-std::string refusal_of_network(const RBFNetworkConfig& config) {
-  return testing::message_of<std::length_error>([&] { UsedRBF network(config); });
+std::string size_error_of(const RBFNetworkConfig& config) {
+  return testing::message_of<std::length_error>([&] { RBFWithWorkspace network(config); });
 }
 
 TEST(RBFNetwork, RefusesTooManyBasesBeforeItAllocatesMemory) {
-  EXPECT_EQ(refusal_of_network({.n_inputs = 13}),
+  EXPECT_EQ(size_error_of({.n_inputs = 13}),
             "n_bases or n_inputs must be smaller: a table of 4^14 = 268435456 joint bases needs "
-            "2147483648 bytes, but "
-            "max_table_bytes is 1073741824");
-  EXPECT_EQ(refusal_of_network({.n_inputs = 62, .max_table_bytes = UINT64_MAX}),
+            "2147483648 bytes, but max_table_bytes is 1073741824");
+  EXPECT_EQ(size_error_of({.n_inputs = 62, .max_table_bytes = UINT64_MAX}),
             "n_bases or n_inputs must be smaller: a table of 4^63 joint bases needs 2^64 bytes or "
-            "more, but max_table_bytes is "
-            "18446744073709551615");
+            "more, but max_table_bytes is 18446744073709551615");
   EXPECT_EQ(
-      refusal_of_network({.n_inputs = 1, .n_bases = 8000, .n_actions = 1 << 20}),
+      size_error_of({.n_inputs = 1, .n_bases = 8000, .n_actions = 1 << 20}),
       "n_actions or n_bases must be smaller: the bases of all actions need 67108864000 bytes, "
       "but max_table_bytes is 1073741824");
 }
 
 TEST(RBFNetwork, RefusesBadArgumentsAndChangesNothing) {
-  UsedRBF network = taught({.n_inputs = 2, .n_actions = 3}, 10);
+  RBFWithWorkspace network = testing::trained_at_random<RBFWithWorkspace>(
+      RBFNetworkConfig{.n_inputs = 2, .n_actions = 3}, 10);
   const std::vector<double> weights(network.weights().begin(), network.weights().end());
   const std::vector<double> good = {0.1, 0.2}, big = {0.1, 1.2};
   std::vector<double> out(3), short_out(2);
-  EXPECT_THROW(network.set_weights(std::vector<double>(63)), std::invalid_argument);
+  EXPECT_THROW(network.set_weights(std::vector<double>(63)), std::invalid_argument);  // not 4^3
   EXPECT_THROW(network.values(big, out), std::invalid_argument);
   EXPECT_THROW(network.values(good, short_out), std::invalid_argument);
   EXPECT_THROW((void)network.value(good, 3), std::invalid_argument);
@@ -179,8 +162,7 @@ TEST(RBFNetwork, RefusesBadArgumentsAndChangesNothing) {
   EXPECT_THROW(network.update(good, 0, 1.0, 0.0), std::invalid_argument);
   EXPECT_THROW(network.update(good, 0, 1.0, 1.5), std::invalid_argument);
   EXPECT_THROW(network.update(good, 0, 1.0, std::nan("")), std::invalid_argument);
-  EXPECT_THROW(network.update(good, 0, std::numeric_limits<double>::infinity()),
-               std::overflow_error);
+  EXPECT_THROW(network.update(good, 0, testing::kInfinity), std::overflow_error);
   EXPECT_TRUE(std::ranges::equal(network.weights(), weights));
 }
 

@@ -10,8 +10,8 @@
 namespace sdnn::approximators::small_sdnn_c {
 namespace {
 
-SDNNCConfig averaging() {
-  SDNNCConfig config = small();
+SDNNCConfig averaging_config() {
+  SDNNCConfig config = small_config();
   config.averaging_interval = 7;
   return config;
 }
@@ -23,7 +23,7 @@ std::vector<double> averaged_values(Network& network, const State& state) {
 }
 
 TEST(SDNNC, AveragingDoesNotChangeLearning) {
-  Network network(small(), 5), averaging_network(averaging(), 5);
+  Network network(small_config(), 5), averaging_network(averaging_config(), 5);
   core::Random random(1, core::Stream::weights);
   for (int t = 0; t < 400; ++t) {
     const State state = random_state(3, random);
@@ -37,12 +37,13 @@ TEST(SDNNC, AveragingDoesNotChangeLearning) {
   EXPECT_FALSE(network.has_average());
   EXPECT_TRUE(averaging_network.has_average());
   const State state = random_state(3, random);
-  EXPECT_EQ(averaged_values(network, state), values(network, state));  // as there is none
+  EXPECT_EQ(averaged_values(network, state), values(network, state));  // has no average
   EXPECT_NE(averaged_values(averaging_network, state), values(network, state));
 }
 
+// Weights are averaged every 7 corrections, so there is an average after 50.
 TEST(SDNNC, SettingParametersRestartsTheAverage) {
-  Network network(averaging(), 5);
+  Network network(averaging_config(), 5);
   const State state = {0.2, 0.7, 0.4};
   for (int t = 0; t < 50; ++t) network.update(state, 30, 10.0);
   EXPECT_TRUE(network.has_average());
@@ -54,7 +55,7 @@ TEST(SDNNC, SettingParametersRestartsTheAverage) {
 }
 
 TEST(SDNNC, AveragingAllocatesNothingWhileItLearns) {
-  Network network(averaging(), 5);
+  Network network(averaging_config(), 5);
   core::Random random(1, core::Stream::weights);
   State state = random_state(3, random);
   for (int t = 0; t < 20; ++t) network.update(state, 3, 5.0);

@@ -31,7 +31,7 @@ TEST(SDNNC, QIsExactlyZeroEverywhereAtTheStart) {
 
 // A lattice of 8 stores parameters in eighths: thresholds of -10 and 10, weights up to 1/2.
 TEST(SDNNC, UniformInitialWeightsStayWithinTheirLimitOnTheLattice) {
-  SDNNCConfig config = small();
+  SDNNCConfig config = small_config();
   config.lattice = 8;
   config.initial_weights = InitialWeights::uniform;
   config.initial_weight_limit = 0.5;
@@ -52,8 +52,8 @@ TEST(SDNNC, UniformInitialWeightsStayWithinTheirLimitOnTheLattice) {
 // rounding at random.
 TEST(SDNNC, RoundingDecidesOnFractionsOfAUnit) {
   const State state = {0.1, 0.5, 0.9};
-  const auto moved = [&](Rounding rounding, double units, std::uint64_t seed) {
-    SDNNCConfig config = small();
+  const auto units_moved = [&](Rounding rounding, double units, std::uint64_t seed) {
+    SDNNCConfig config = small_config();
     config.initial_threshold = 2.0;  // less than a correction, so that each makes a unit fire
     config.rounding = rounding;
     Network network(config, seed);
@@ -62,20 +62,20 @@ TEST(SDNNC, RoundingDecidesOnFractionsOfAUnit) {
     network.update(state, 3, before + units * unit);
     return static_cast<int>(std::lround((network.value(state, 3) - before) / unit));
   };
-  EXPECT_EQ(moved(Rounding::half_up, 0.25, 5), 0);
-  EXPECT_EQ(moved(Rounding::half_up, 0.5, 5), 1);
-  EXPECT_EQ(moved(Rounding::half_up, -0.5, 5), 0);
-  EXPECT_EQ(moved(Rounding::away, 0.25, 5), 1);
-  EXPECT_EQ(moved(Rounding::away, -0.25, 5), -1);
-  EXPECT_EQ(moved(Rounding::away, 2.0, 5), 2);
-  EXPECT_EQ(moved(Rounding::away, 0.0, 5), 0);
+  EXPECT_EQ(units_moved(Rounding::half_up, 0.25, 5), 0);
+  EXPECT_EQ(units_moved(Rounding::half_up, 0.5, 5), 1);
+  EXPECT_EQ(units_moved(Rounding::half_up, -0.5, 5), 0);
+  EXPECT_EQ(units_moved(Rounding::away, 0.25, 5), 1);
+  EXPECT_EQ(units_moved(Rounding::away, -0.25, 5), -1);
+  EXPECT_EQ(units_moved(Rounding::away, 2.0, 5), 2);
+  EXPECT_EQ(units_moved(Rounding::away, 0.0, 5), 0);
   int up = 0, down = 0;
   constexpr int kNetworks = 400;
   for (std::uint64_t seed = 0; seed < kNetworks; ++seed) {
-    const int rise = moved(Rounding::random, 0.25, seed);
+    const int rise = units_moved(Rounding::random, 0.25, seed);
     EXPECT_TRUE(rise == 0 || rise == 1);
     up += rise;
-    down -= moved(Rounding::random, -1.75, seed);
+    down -= units_moved(Rounding::random, -1.75, seed);
   }
   const double sigma = std::sqrt(kNetworks * 0.25 * 0.75);
   EXPECT_NEAR(up, 0.25 * kNetworks, 5 * sigma);
@@ -83,8 +83,8 @@ TEST(SDNNC, RoundingDecidesOnFractionsOfAUnit) {
 }
 
 // Weights of two bytes have separate storage and sums, which must not allocate on first use either.
-TEST(SDNNC, LargeWeightsAllocateNothing) {
-  SDNNCConfig config = small();
+TEST(SDNNC, LearningLargeWeightsAllocatesNothing) {
+  SDNNCConfig config = small_config();
   config.lattice = 64;
   config.initial_threshold = 0.0;
   Network network(config, 1);
@@ -104,7 +104,7 @@ TEST(SDNNC, LargeWeightsAllocateNothing) {
 }
 
 TEST(SDNNC, CopiesShareNothingThatIsLearned) {
-  Network original(small(), 3);
+  Network original(small_config(), 3);
   const State state = {0.2, 0.4, 0.6};
   original.update(state, 5, 9.0);
   const std::vector<double> before = values(original, state);
@@ -121,7 +121,7 @@ TEST(SDNNC, CopiesShareNothingThatIsLearned) {
 }
 
 TEST(SDNNC, RefusesParametersOfWrongValueOrNumberAndKeepsItsOwn) {
-  Network network(small(), 3);
+  Network network(small_config(), 3);
   const Network before = network;
   const std::vector<std::int32_t> thresholds(network.hidden_layer().n_units(), 1);
   std::vector<std::int32_t> weights(thresholds.size() * network.state_code().n_columns());
@@ -134,7 +134,7 @@ TEST(SDNNC, RefusesParametersOfWrongValueOrNumberAndKeepsItsOwn) {
 
 // warm_caches touches all memory before the first step, and counts no pass over the weights.
 TEST(SDNNC, WarmCachesChangeNothing) {
-  Network cold(small(), 5);
+  Network cold(small_config(), 5);
   Network warm = cold;
   warm.warm_caches();
   EXPECT_EQ(warm.own_workspace().cache().counts().full, 0U);
@@ -145,26 +145,25 @@ TEST(SDNNC, WarmCachesChangeNothing) {
 }
 
 TEST(SDNNC, TheEndsOfTheUnitIntervalAreStates) {
-  Network network(small(), 1);
+  Network network(small_config(), 1);
   EXPECT_EQ(values(network, {0.0, 0.0, 0.0}).size(), 200U - 60 + 1);  // windows of 60 units
   EXPECT_EQ(values(network, {1.0, 1.0, 1.0}), values(network, {0.9999, 0.9999, 0.9999}));
   EXPECT_EQ(values(network, {-0.0, 0.0, 0.0}), values(network, {0.0, 0.0, 0.0}));
 }
 
-// The network has three inputs in [0, 1] and 141 actions.
+// The network has three inputs in [0, 1] and 200 - 60 + 1 = 141 actions.
 TEST(SDNNC, ABadArgumentChangesNothing) {
-  Network network(small(), 1);
+  Network network(small_config(), 1);
   const Network before = network;
   const State good = {0.1, 0.2, 0.3};
-  for (const double bad :
-       {std::nan(""), -1e-300, 1.0000001, std::numeric_limits<double>::infinity()}) {
+  for (const double bad : {testing::kNaN, -1e-300, 1.0000001, testing::kInfinity}) {
     const State state = {0.1, bad, 0.3};
     EXPECT_THROW((void)network.value(state, 0), std::invalid_argument);
     EXPECT_THROW(network.update(state, 0, 1.0), std::invalid_argument);
     EXPECT_THROW((void)values(network, state), std::invalid_argument);
     EXPECT_THROW((void)potentials(network, state), std::invalid_argument);
   }
-  EXPECT_THROW(network.update(good, 0, std::nan("")), std::invalid_argument);
+  EXPECT_THROW(network.update(good, 0, testing::kNaN), std::invalid_argument);
   EXPECT_THROW(network.update(good, 141, 1.0), std::invalid_argument);
   EXPECT_THROW((void)network.value(good, 141), std::invalid_argument);
   EXPECT_THROW((void)network.value(State{0.1, 0.2}, 0), std::invalid_argument);
@@ -176,7 +175,7 @@ TEST(SDNNC, ABadArgumentChangesNothing) {
 
 // A value keeps its share of the way from the low to the high end of the range.
 TEST(SDNNC, AnotherRangeScalesTheValues) {
-  Network network(small(), 1);
+  Network network(small_config(), 1);
   core::Random random(6, core::Stream::ties);
   const State state = random_state(3, random);
   network.update(state, 3, 9.0);
@@ -188,7 +187,7 @@ TEST(SDNNC, AnotherRangeScalesTheValues) {
     EXPECT_NEAR((after[a] - 100.0) / 200.0, (before[a] - low) / (high - low), 1e-12);
     EXPECT_EQ(after[a], network.value(state, a));
   }
-  for (const auto& [bad_low, bad_high] : {std::pair(1.0, 1.0), std::pair(std::nan(""), 2.0),
+  for (const auto& [bad_low, bad_high] : {std::pair(1.0, 1.0), std::pair(testing::kNaN, 2.0),
                                           std::pair(-1e302, 1.0), std::pair(0.0, 1e302)}) {
     EXPECT_THROW(network.set_output_range(bad_low, bad_high), std::invalid_argument);
   }
@@ -236,8 +235,7 @@ TEST(SDNNC, RefusesAStateThatDoesNotFit) {
   testing::expect_damaged_states_refused(network);
   const core::State good = core::state_of(network);
   EXPECT_EQ(good.at("weights").shape, (std::vector<std::size_t>{12, 2 * 8}));  // units, columns
-  // Weights beyond their limit of 16383, thresholds of 2^30 in size, and an empty or infinite
-  // range.
+  // Weights beyond their limit of 16383, thresholds of 2^30 in size, an empty or infinite range.
   const auto refused = [&](const core::State& bad, const std::string& message) {
     testing::expect_refused(network, bad, "state: " + message);
   };
@@ -247,7 +245,7 @@ TEST(SDNNC, RefusesAStateThatDoesNotFit) {
   refused(with_number(good, "thresholds", std::int32_t{1} << 30, 3), "thresholds must be of less");
   refused(with_number(good, "thresholds", std::numeric_limits<std::int32_t>::min(), 3),
           "thresholds must be of less");
-  for (const double bad : {std::nan(""), 20.0, -std::numeric_limits<double>::infinity(), 1e302}) {
+  for (const double bad : {testing::kNaN, 20.0, -testing::kInfinity, 1e302}) {
     refused(with_number(good, "output_range", bad, 0), "output_range must be such that q_");
   }
 }

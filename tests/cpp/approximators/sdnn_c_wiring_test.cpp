@@ -26,7 +26,7 @@ TEST(SDNNC, ThePapersSizesFollowFromTheDefaults) {
   EXPECT_EQ(Network({.n_inputs = 6}, 1).state_code().n_columns(), 6U * 5 * 200);
 }
 
-TEST(SDNNC, PairsOfInputsAreAnEvenShareOfAll) {
+TEST(SDNNC, MaxPairsGivesEveryInputEquallyManyPartners) {
   const SDNNCConfig sizes{
       .n_inputs = 7, .n_pattern_units = 20, .n_hidden_units = 60, .n_active_units = 20};
   const auto partners = [&](int max_pairs) {
@@ -66,12 +66,12 @@ TEST(SDNNC, PairsOfInputsAreAnEvenShareOfAll) {
   expect_equal_parameters(Network(config, 7), Network(sizes, 7));
 }
 
-std::string message(const SDNNCConfig& config) {
+std::string error_of(const SDNNCConfig& config) {
   return testing::message_of([&] { Network(config, 1); });
 }
 
-void expect_named(const SDNNCConfig& config, const std::string& name) {
-  EXPECT_EQ(message(config).rfind(name + " must be ", 0), 0U) << message(config);
+void expect_error_of(const SDNNCConfig& config, const std::string& name) {
+  EXPECT_EQ(error_of(config).rfind(name + " must be ", 0), 0U) << error_of(config);
 }
 
 TEST(SDNNC, TooLargeANetworkIsRefusedBeforeMemoryIsAllocated) {
@@ -102,19 +102,19 @@ TEST(SDNNC, TooLargeANetworkIsRefusedBeforeMemoryIsAllocated) {
 }
 
 TEST(SDNNC, NamesTheFieldThatDoesNotFitTheOthers) {
-  EXPECT_EQ(message({.n_hidden_units = 900, .n_active_units = 901}),
+  EXPECT_EQ(error_of({.n_hidden_units = 900, .n_active_units = 901}),
             "n_active_units must be in [1, 900], got 901");
-  EXPECT_EQ(message({.circular = {true}}), "circular must be empty or one flag per input, got 1");
-  EXPECT_EQ(message({.n_symbols = {3}}), "n_symbols must be empty or a number per input, got 1");
-  EXPECT_EQ(message({.n_symbols = {0, -1, 0, 0}}), "n_symbols must be in [0, 16777216], got -1");
-  expect_named({.circular = {true, false, false, false}, .n_symbols = {3, 0, 0, 0}}, "circular");
-  expect_named({.n_actions = 602}, "n_actions");
-  expect_named({.q_low = 20.0}, "q_high");
-  expect_named({.u_low = 290, .u_high = 280}, "u_high");
-  expect_named({.u_high = 301}, "u_high");
-  expect_named({.initial_threshold = 0.5}, "initial_threshold");
-  expect_named({.initial_weights = InitialWeights::uniform, .initial_weight_limit = 1e300},
-               "initial_weight_limit");
+  EXPECT_EQ(error_of({.circular = {true}}), "circular must be empty or one flag per input, got 1");
+  EXPECT_EQ(error_of({.n_symbols = {3}}), "n_symbols must be empty or a number per input, got 1");
+  EXPECT_EQ(error_of({.n_symbols = {0, -1, 0, 0}}), "n_symbols must be in [0, 16777216], got -1");
+  expect_error_of({.circular = {true, false, false, false}, .n_symbols = {3, 0, 0, 0}}, "circular");
+  expect_error_of({.n_actions = 602}, "n_actions");
+  expect_error_of({.q_low = 20.0}, "q_high");
+  expect_error_of({.u_low = 290, .u_high = 280}, "u_high");
+  expect_error_of({.u_high = 301}, "u_high");
+  expect_error_of({.initial_threshold = 0.5}, "initial_threshold");
+  expect_error_of({.initial_weights = InitialWeights::uniform, .initial_weight_limit = 1e300},
+                  "initial_weight_limit");
 }
 
 }  // namespace

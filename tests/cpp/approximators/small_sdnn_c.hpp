@@ -10,22 +10,16 @@
 
 #include "approximators/with_workspace.hpp"
 #include "sdnn/approximators/sdnn_c.hpp"
-#include "sdnn/core/random.hpp"
 
 namespace sdnn::approximators::small_sdnn_c {
 
 using Network = testing::WithWorkspace<SDNNC>;
+using testing::random_state;
 using State = std::vector<double>;
 
 /// The learning tests run on a smaller network, which has the same parts.
-inline SDNNCConfig small() {
+inline SDNNCConfig small_config() {
   return {.n_inputs = 3, .n_pattern_units = 50, .n_hidden_units = 200, .n_active_units = 60};
-}
-
-inline State random_state(std::size_t n_inputs, core::Random& random) {
-  State state(n_inputs);
-  for (double& value : state) value = random.uniform();
-  return state;
 }
 
 inline std::vector<double> values(Network& network, const State& state) {
@@ -40,8 +34,7 @@ inline std::vector<std::int32_t> potentials(const Network& network, const State&
   return out;
 }
 
-/// Q(s, a) of every action from a full pass and window masks, without caches and sliding
-/// counts.
+/// Q(s, a) of every action from a full pass and window masks, without caches and sliding counts.
 inline std::vector<double> values_by_masks(const Network& network, const State& state) {
   using Mask = std::bitset<1024>;
   const std::vector<std::int32_t> h = potentials(network, state);

@@ -5,8 +5,17 @@
 #include <span>
 #include <type_traits>
 #include <utility>
+#include <vector>
+
+#include "sdnn/core/random.hpp"
 
 namespace sdnn::testing {
+
+inline std::vector<double> random_state(std::size_t n_inputs, core::Random& random) {
+  std::vector<double> state(n_inputs);
+  for (double& x : state) x = random.uniform();
+  return state;
+}
 
 template <class Q>
 class WithWorkspace : public Q {
@@ -45,5 +54,18 @@ class WithWorkspace : public Q {
 
   typename Q::Workspace workspace_ = Q::workspace();
 };
+
+/// A network that has learned random targets in [-10, 10], so that its weights differ.
+template <class Network, class Config>
+Network trained_at_random(const Config& config, int n_corrections) {
+  Network network(config);
+  core::Random random(7, core::Stream::weights);
+  for (int i = 0; i < n_corrections; ++i) {
+    const auto state = random_state(network.n_inputs(), random);
+    const auto action = static_cast<std::size_t>(random.below(network.n_actions()));
+    network.update(state, action, 20.0 * random.uniform() - 10.0);
+  }
+  return network;
+}
 
 }  // namespace sdnn::testing

@@ -49,14 +49,14 @@ TEST(ColumnChanges, AreAddedToTheColumnsListed) {
   });
 }
 
-TEST(ColumnChanges, FindTheLargestByteOfEachUnit) {
+TEST(ColumnChanges, FindTheLargestMagnitudeOfEachUnitsBytes) {
   testing::on_every_instruction_set([](std::string_view level) {
     core::Random random(2, core::Stream::weights);
     for (int problem = 0; problem < 200; ++problem) {
       const std::size_t n_columns = 1 + random.below(30);
       const auto block = random_block(random, n_columns);
       detail::Bytes expected{};
-      for (std::size_t at = 0; at < block.size(); ++at) {
+      for (std::size_t at = 0; at < block.size(); ++at) {  // column by column
         auto& largest = expected[at % kBlockUnits];
         largest = static_cast<std::int8_t>(std::max<int>(largest, std::abs(block[at])));
       }

@@ -6,9 +6,9 @@
 #include <array>
 #include <cstdint>
 #include <span>
-#include <string>
 #include <vector>
 
+#include "instruction_sets.hpp"
 #include "sdnn/core/detail/aligned_buffer.hpp"
 #include "sdnn/core/random.hpp"
 
@@ -60,40 +60,24 @@ Sums plain_sums(const Problem& p) {
   return sums;
 }
 
-class EveryLevel : public ::testing::TestWithParam<core::InstructionSet> {
- protected:
-  void SetUp() override {
-    if (!core::offers(GetParam())) {
-      GTEST_SKIP() << "this processor has no " << core::name_of(GetParam());
+// Sums of listed columns, times a factor, are added in calls of at most kMost columns.
+TEST(ColumnSums, EqualPlainSumsOn100000RandomProblemsOnEveryInstructionSet) {
+  testing::on_every_instruction_set([](auto level) {
+    core::Random random(1, core::Stream::weights);
+    for (int problem = 0; problem < 100000; ++problem) {
+      const Problem p = random_problem(random);
+      Sums sums = p.start;
+      const std::size_t zeros = p.block.size() / kBlockUnits - 1;  // the last column is 0
+      std::span<const std::uint32_t> left = p.columns;
+      do {
+        const auto columns = left.first(std::min(ColumnPlaces::kMost, left.size()));
+        left = left.subspan(columns.size());
+        add_columns(p.block.data(), ColumnPlaces(columns, zeros), p.group, p.factor, sums.data());
+      } while (!left.empty());
+      ASSERT_EQ(sums, plain_sums(p)) << level << ", problem " << problem;
     }
-    before_ = core::instruction_set();
-    core::set_instruction_set(core::name_of(GetParam()));
-  }
-  void TearDown() override { core::set_instruction_set(core::name_of(before_)); }
-
- private:
-  core::InstructionSet before_ = core::instruction_set();
-};
-
-TEST_P(EveryLevel, EqualsPlainSumsOn100000RandomProblems) {
-  core::Random random(1, core::Stream::weights);
-  for (int problem = 0; problem < 100000; ++problem) {
-    const Problem p = random_problem(random);
-    Sums sums = p.start;
-    const std::size_t zeros =  // the last column, which fills incomplete groups
-        p.block.size() / kBlockUnits - 1;
-    std::span<const std::uint32_t> left = p.columns;
-    do {
-      const auto columns = left.first(std::min(ColumnPlaces::kMost, left.size()));
-      left = left.subspan(columns.size());
-      add_columns(p.block.data(), ColumnPlaces(columns, zeros), p.group, p.factor, sums.data());
-    } while (!left.empty());
-    ASSERT_EQ(sums, plain_sums(p)) << "problem " << problem;
-  }
+  });
 }
-
-INSTANTIATE_TEST_SUITE_P(Levels, EveryLevel, ::testing::ValuesIn(core::kInstructionSets),
-                         [](const auto& info) { return std::string(core::name_of(info.param)); });
 
 }  // namespace
 }  // namespace sdnn::approximators

@@ -32,7 +32,8 @@ Rows random_rows(std::size_t n, std::uint64_t seed) {
   return rows;
 }
 
-TEST(LinearRows, SumsOfTheLargestWeightsAreExactOnEveryInstructionSet) {
+// Weights have 24 bits: up to 2^23 - 1.
+TEST(LinearRows, SumsOfRandomAndOfTheLargestWeightsAreExactOnEveryInstructionSet) {
   for (const std::size_t n : {64U, 192U, 256U, 320U, 1024U}) {
     Rows rows = random_rows(n, n);
     std::int64_t expected = 0;
@@ -97,12 +98,14 @@ TEST(LinearRows, AStepOfTracesAndWeightsIsAsWorkedByHand) {
                      .correction = 2};
   const RowUse use = learn_row(weights.data(), traces.data(), signs.data(), 3, step);
   EXPECT_EQ(traces, (std::vector<std::int32_t>{4097, -4097, 2048}));
-  // 100 + round(5 * 4097 / 4096) - 2; 100 + round(-5.001) + 2; 100 + round(2.5), halves up
+  // The step of 5 is shifted by 12 bits, a division by 4096; the correction of 2 is subtracted:
+  // 100 + round(5 * 4097 / 4096) - 2; 100 + round(-5.001) + 2; 100 + round(2.5), halves up.
   EXPECT_EQ(weights, (std::vector<std::int32_t>{103, 97, 103}));
   EXPECT_EQ(use.weights, 103 | 97);  // the bits that any weight uses
   EXPECT_NE(use.traces, 0);
 }
 
+// The factor of the trace and the code's part are 1; `replace` is a mask of ones.
 TEST(LinearRows, AReplacingTraceIsOverwrittenWhereTheCodeIsActive) {
   std::vector<std::int32_t> weights{0, 0}, traces{9000, 9000};
   const std::vector<std::int8_t> signs{-1, 0};
@@ -116,24 +119,25 @@ TEST(LinearRows, AReplacingTraceIsOverwrittenWhereTheCodeIsActive) {
   EXPECT_EQ(traces, (std::vector<std::int32_t>{-kTraceOne, 9000}));
 }
 
-TEST(LinearRows, ACorrectionIsSubtractedTimesTheCode) {
+// Weights, traces and signs of the code are random; the correction is 0 or 3.
+TEST(LinearRows, ACorrectionIsSubtractedTimesTheCodeOnEveryInstructionSet) {
   const Rows rows = random_rows(320, 3);
   RowStep step{.decay = 7000, .gain = 900, .replace = -1, .step = -77, .shift = 9, .correction = 0};
   testing::on_every_instruction_set([&](auto) {
-    Rows quick = rows, corrected = rows;
-    const RowUse use = detail::learn_row_portable(quick.weights.data(), quick.traces.data(),
-                                                  rows.signs.data(), 320, step);
+    Rows uncorrected = rows, corrected = rows;
+    const RowUse use = detail::learn_row_portable(
+        uncorrected.weights.data(), uncorrected.traces.data(), rows.signs.data(), 320, step);
     step.correction = 3;
     learn_row(corrected.weights.data(), corrected.traces.data(), rows.signs.data(), 320, step);
     step.correction = 0;
     EXPECT_NE(use.traces, 0);
-    EXPECT_EQ(quick.traces, corrected.traces);
+    EXPECT_EQ(uncorrected.traces, corrected.traces);
     for (std::size_t j = 0; j < 320; ++j) {
-      EXPECT_EQ(corrected.weights[j], quick.weights[j] - 3 * rows.signs[j]);
+      EXPECT_EQ(corrected.weights[j], uncorrected.weights[j] - 3 * rows.signs[j]);
     }
-    Rows other = rows;
-    learn_row(other.weights.data(), other.traces.data(), rows.signs.data(), 320, step);
-    EXPECT_EQ(other.weights, quick.weights);
+    Rows dispatched = rows;
+    learn_row(dispatched.weights.data(), dispatched.traces.data(), rows.signs.data(), 320, step);
+    EXPECT_EQ(dispatched.weights, uncorrected.weights);
   });
 }
 
@@ -142,7 +146,7 @@ TEST(LinearRows, TracesDecayToZeroAndStayWithinTheirLimit) {
   const std::vector<std::int8_t> signs{1, -1};
   RowStep step{
       .decay = kDecayOne, .gain = kTraceOne, .replace = 0, .step = 0, .shift = 1, .correction = 0};
-  learn_row(weights.data(), traces.data(), signs.data(), 2, step);
+  learn_row(weights.data(), traces.data(), signs.data(), 2, step);  // would increase the traces
   EXPECT_EQ(traces, (std::vector<std::int32_t>{kLargestTrace, -kLargestTrace}));
   step.gain = 0;
   step.decay = kDecayOne * 9 / 10;

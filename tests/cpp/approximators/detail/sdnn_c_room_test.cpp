@@ -24,6 +24,7 @@ SDNNCConfig five_inputs() {
           .n_active_units = 40};
 }
 
+// Inputs 1 and 3 of five are symbols, of 7 and 3 values; the others are numbers with 3 anchors.
 TEST(Wiring, HasOneTablePerInput) {
   const SDNNCConfig config = five_inputs();
   const auto tables = code_books_of(config, 1);

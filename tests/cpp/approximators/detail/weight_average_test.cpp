@@ -10,7 +10,7 @@
 namespace sdnn::approximators {
 namespace {
 
-double steps_of(const WeightAverage& average, std::size_t unit, std::size_t column) {
+double mean_weight(const WeightAverage& average, std::size_t unit, std::size_t column) {
   return average.weight(unit, column) / static_cast<double>(1 << average.fraction_bits());
 }
 
@@ -23,7 +23,7 @@ TEST(WeightAverage, SnapshotsAreAveragedAsWorkedByHand) {
     layer.set_weight(1, 2, weight);
     layer.set_threshold(0, -weight);
     average.note(n, layer);
-    return steps_of(average, 1, 2);
+    return mean_weight(average, 1, 2);
   };
   EXPECT_EQ(average_after(1, 8), 0);
   EXPECT_EQ(average.n_snapshots(), 0U);
@@ -39,7 +39,7 @@ TEST(WeightAverage, SnapshotsAreAveragedAsWorkedByHand) {
   EXPECT_EQ(average.fraction_bits(), 10);  // so that the largest weight, 16, fits in 15 bits
 }
 
-// High bytes, the last unit of a layer that fills no block, and the largest weights.
+// Weights of one and two bytes, up to the largest; unit 69 is the last one of an incomplete block.
 TEST(WeightAverage, AveragesWeightsOfAnySize) {
   constexpr std::int32_t kLimit = HiddenLayer::kWeightLimit;
   HiddenLayer layer(70, 4);
@@ -55,8 +55,8 @@ TEST(WeightAverage, AveragesWeightsOfAnySize) {
     EXPECT_EQ(average.weight(3, 1), -weight * unit_weight);
     layer.set_weight(69, 1, -weight);
     for (std::uint64_t n = 2; n < 4000; ++n) average.note(n, layer);
-    EXPECT_NEAR(average.weight(69, 1), -weight * unit_weight, 4)
-        << weight;  // steps of an eighth round to 0
+    // Late snapshots move the average by an eighth of the distance, which rounds to 0 below 4.
+    EXPECT_NEAR(average.weight(69, 1), -weight * unit_weight, 4) << weight;
   }
 }
 
@@ -68,7 +68,7 @@ TEST(WeightAverage, AnOscillatingWeightAveragesToItsMiddle) {
     layer.set_weight(0, 0, n / 700 % 2 == 0 ? 100 : -100);
     average.note(n, layer);
   }
-  EXPECT_LT(std::abs(steps_of(average, 0, 0)), 20);
+  EXPECT_LT(std::abs(mean_weight(average, 0, 0)), 20);
   EXPECT_LT(average.n_snapshots(),
             64U + 64U * 4U);  // every 10 until 640, then every n / 64: 64 ln(20000 / 640)
 }
@@ -85,7 +85,7 @@ TEST(WeightAverage, ForgetRestartsTheAverage) {
   average.note(109, layer);
   EXPECT_EQ(average.n_snapshots(), 0U);
   average.note(110, layer);
-  EXPECT_EQ(steps_of(average, 0, 0), 9);
+  EXPECT_EQ(mean_weight(average, 0, 0), 9);
 }
 
 TEST(WeightAverage, RefusesInconsistentStates) {
