@@ -24,7 +24,8 @@ Pairs apply(Rule& rule, std::size_t sample, const std::vector<std::int32_t>& pot
   return pairs;
 }
 
-// A target is the number of units that should fire. Expected are (unit, direction) pairs.
+// A target is the number of units that should fire. The rule is applied to each of eight samples
+// with a target; results are (unit, direction) pairs.
 TEST(PDeltaRule, CorrectsTheNearestUnitsAndOfEqualOnesTheLowestIndex) {
   const std::vector<std::int32_t> potentials{5, -2, 0, 3, -2, -9};  // units 0 and 3 fire
   estimators::PDeltaRule rule(6, std::vector<double>{2.0, 4.0, 1.0, 3.49, 3.5, 0.0, 99.0, -99.0},
@@ -36,9 +37,8 @@ TEST(PDeltaRule, CorrectsTheNearestUnitsAndOfEqualOnesTheLowestIndex) {
   EXPECT_EQ(apply(rule, 3, potentials), (Pairs{{2, 1}}));            // rounds to 3
   EXPECT_EQ(apply(rule, 4, potentials), (Pairs{{1, 1}, {2, 1}}));    // rounds to 4
   EXPECT_EQ(apply(rule, 5, potentials), (Pairs{{0, -1}, {3, -1}}));  // all that fire
-  EXPECT_EQ(apply(rule, 6, potentials),
-            (Pairs{{1, 1}, {2, 1}, {4, 1}, {5, 1}}));  // all silent ones
-  EXPECT_EQ(apply(rule, 7, potentials), (Pairs{{0, -1}, {3, -1}}));
+  EXPECT_EQ(apply(rule, 6, potentials), (Pairs{{1, 1}, {2, 1}, {4, 1}, {5, 1}}));  // all silent
+  EXPECT_EQ(apply(rule, 7, potentials), (Pairs{{0, -1}, {3, -1}}));  // -99 counts as 0
 }
 
 // Units 0 and 1 should both be active, units 2 and 3 both inactive.
@@ -71,11 +71,12 @@ TEST(ClassScheme, SchemesHaveNamesAndNumbersOfUnits) {
     EXPECT_EQ(estimators::class_scheme_named(estimators::name_of(scheme)), scheme);
   }
   EXPECT_EQ(estimators::n_units_for(estimators::class_scheme_named("one_vs_rest"), 4), 4U);
-  EXPECT_EQ(estimators::n_units_for(estimators::class_scheme_named("one_vs_one"), 4), 6U);
+  EXPECT_EQ(estimators::n_units_for(estimators::class_scheme_named("one_vs_one"), 4), 4U * 3 / 2);
   EXPECT_THROW(estimators::class_scheme_named("one_vs_two"), std::invalid_argument);
   EXPECT_THROW(estimators::n_units_for(ClassScheme::one_vs_one, 1), std::invalid_argument);
 }
 
+// The sample is of class 1 of three: unit 1 should fire, units 0 and 2 should not.
 TEST(PerceptronRule, OneVersusRestCorrectsUnitsOfWrongSign) {
   estimators::PerceptronRule rule(3, std::vector<std::int32_t>{1}, 3, ClassScheme::one_vs_rest);
   EXPECT_EQ(apply(rule, 0, {1, 0, -1}), (Pairs{{0, -1}, {1, 1}}));

@@ -20,14 +20,14 @@ using Bins = std::vector<std::int32_t>;
 using Reals = std::vector<double>;
 
 /// Correlations with the first of n bins that fall by a factor from bin to bin.
-InputCorrelations falling(double factor, std::size_t n_bins) {
+InputCorrelations powers_of(double factor, std::size_t n_bins) {
   InputCorrelations input{Reals(n_bins, 1.0), n_bins};
   for (std::size_t b = 1; b < n_bins; ++b) input.values[b] = factor * input.values[b - 1];
   return input;
 }
 
-/// Correlations of all bins that fall by a factor.
-InputCorrelations falling_table(double factor, std::size_t n_bins) {
+/// Correlations of all pairs of bins that fall by a factor from bin to bin.
+InputCorrelations table_of_powers(double factor, std::size_t n_bins) {
   InputCorrelations input{Reals(n_bins * n_bins), n_bins};
   for (std::size_t a = 0; a < n_bins; ++a) {
     for (std::size_t b = 0; b < n_bins; ++b) {
@@ -52,7 +52,7 @@ Reals matrix_of(const KernelSums& kernel, const Bins& bins) {
 
 // The last two arguments of a kernel are its number of terms and its degree.
 TEST(KernelSums, IsTheMeanOverPairsByHand) {
-  const std::vector inputs{falling(0.5, 4), InputCorrelations{{1.0, 0.25, 0.25, 1.0}, 2}};
+  const std::vector inputs{powers_of(0.5, 4), InputCorrelations{{1.0, 0.25, 0.25, 1.0}, 2}};
   // The query (2, 1) correlates with the sample (0, 0) by 1/4 and 1/4, with (3, 1) by 1/2 and 1.
   // The kernel is the mean of (1 + rho_i) / 2 * rho_j over the ordered pairs of inputs i != j.
   const double far = (1.25 / 2 * 0.25 + 1.25 / 2 * 0.25) / 2;
@@ -60,15 +60,17 @@ TEST(KernelSums, IsTheMeanOverPairsByHand) {
   EXPECT_EQ(matrix_of({inputs, Bins{0, 0, 3, 1}, 2, 1}, {2, 1}), (Reals{far, near}));
   EXPECT_EQ(matrix_of({inputs, Bins{0, 0}, 2, 2}, {2, 1}), Reals{far * (0.5 + 0.5 * far)});
   EXPECT_EQ(matrix_of({inputs, Bins{0, 0}, 2, 3}, {2, 1}), Reals{far * far * far});
-  EXPECT_EQ(matrix_of({{falling(0.5, 4)}, Bins{0, 1, 3}, 1, 1}, {1}), (Reals{0.5, 1.0, 0.25}));
+  EXPECT_EQ(matrix_of({{powers_of(0.5, 4)}, Bins{0, 1, 3}, 1, 1}, {1}), (Reals{0.5, 1.0, 0.25}));
 }
 
 // Correlations that fall by a factor are powers of it, which need no table of all pairs of bins.
 TEST(KernelSums, PowersAndTablesAgree) {
   const Bins samples = bins_of(50, 3, 40), queries = bins_of(37, 3, 31);
-  const KernelSums powers({falling(0.9, 40), falling(0.7, 40), falling(0.99, 40)}, samples, 3, 2);
-  const KernelSums tables({falling_table(0.9, 40), falling_table(0.7, 40), falling_table(0.99, 40)},
-                          samples, 3, 2);
+  const KernelSums powers({powers_of(0.9, 40), powers_of(0.7, 40), powers_of(0.99, 40)}, samples, 3,
+                          2);
+  const KernelSums tables(
+      {table_of_powers(0.9, 40), table_of_powers(0.7, 40), table_of_powers(0.99, 40)}, samples, 3,
+      2);
   const Reals first = matrix_of(powers, queries), second = matrix_of(tables, queries);
   for (std::size_t k = 0; k < first.size(); ++k) EXPECT_NEAR(first[k], second[k], 1e-14);
 }
@@ -82,10 +84,11 @@ TEST(KernelSums, ABinOfCorrelationZeroIsUnlikeAll) {
   EXPECT_EQ(matrix_of(kernel, {1, 0, 2, 1}), (Reals{0.5, 0.0, 0.0, 1.0}));
 }
 
+// 83 samples and 41 queries have five inputs of 20 bins; there are two outputs.
 TEST(KernelSums, SumsAreProductsWithTheMatrixWithTheSameBitsEverywhere) {
   const Bins samples = bins_of(83, 5, 20), queries = bins_of(41, 5, 20);
-  const std::vector inputs{falling(0.9, 20), falling_table(0.8, 20), falling(0.8, 20),
-                           falling_table(0.5, 20), falling(0.95, 20)};
+  const std::vector inputs{powers_of(0.9, 20), table_of_powers(0.8, 20), powers_of(0.8, 20),
+                           table_of_powers(0.5, 20), powers_of(0.95, 20)};
   const KernelSums kernel(inputs, samples, 5, 3);
   Reals coefficients(83 * 2);
   for (std::size_t k = 0; k < coefficients.size(); ++k) {
@@ -111,7 +114,7 @@ TEST(KernelSums, SumsAreProductsWithTheMatrixWithTheSameBitsEverywhere) {
 
 TEST(KernelSums, RefusesImpossibleArguments) {
   using testing::message_of;
-  const std::vector inputs{falling(0.5, 4)};
+  const std::vector inputs{powers_of(0.5, 4)};
   const auto message = [](std::vector<InputCorrelations> of, const Bins& bins, std::size_t n_terms,
                           int degree) {
     return message_of([&] { KernelSums(std::move(of), bins, n_terms, degree); });

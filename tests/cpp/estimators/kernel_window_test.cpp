@@ -21,6 +21,11 @@ using testing::kNaN;
 using testing::predicted;
 using Numbers = std::vector<double>;
 
+/// A window of `capacity` samples of one input in [0, 1] and one output.
+KernelWindow window_of(std::size_t capacity) {
+  return {Numbers{0.0}, Numbers{1.0}, 1, capacity, /*length_scale=*/1.0, /*ridge=*/0.1};
+}
+
 /// Inputs between 0 and 1, spread evenly by the golden ratio, that repeat only after 500.
 double input_of(int i) { return std::fmod(0.618 * i, 1.0); }
 
@@ -39,9 +44,8 @@ TEST(KernelWindow, IsKernelRidgeRegression) {
   EXPECT_NEAR(predicted(window, {0.0}), first + k * second, 1e-15);
 }
 
-// Arguments: the input's range, outputs, capacity in samples, length scale and ridge.
 TEST(KernelWindow, ForgetsAllButTheLastSamples) {
-  KernelWindow window(Numbers{0.0}, Numbers{1.0}, 1, 20, 1.0, 0.1), fresh = window;
+  KernelWindow window = window_of(20), fresh = window;
   for (int i = 0; i < 5000; ++i) {
     const Numbers input{input_of(i)}, target{std::sin(i)};
     window.learn(input, target);
@@ -53,14 +57,16 @@ TEST(KernelWindow, ForgetsAllButTheLastSamples) {
   }
 }
 
+// Input 0 is in [0, 2], input 1 is always 3.
 TEST(KernelWindow, MissingInputsAreTheMiddleAndConstantOnesDoNotCount) {
   KernelWindow window(Numbers{0.0, 3.0}, Numbers{2.0, 3.0}, 1, 20, 1.0, 0.1);
   for (int i = 0; i < 30; ++i) window.learn(Numbers{2.0 * input_of(i), 3.0}, Numbers{input_of(i)});
   EXPECT_EQ(predicted(window, {kNaN, 3.0}), predicted(window, {1.0, 8.0}));
 }
 
+// At last output 0 is 0, and the added output 1 equals the added input 1.
 TEST(KernelWindow, AddedInputsAndOutputsAreLearned) {
-  KernelWindow window(Numbers{0.0}, Numbers{1.0}, 1, 20, 1.0, 0.1);
+  KernelWindow window = window_of(20);
   for (int i = 0; i < 30; ++i) window.learn(Numbers{input_of(i)}, Numbers{input_of(i)});
   window.add_outputs(1);
   Numbers out(2);
@@ -77,12 +83,13 @@ TEST(KernelWindow, AddedInputsAndOutputsAreLearned) {
 
 // Targets larger than 20 times their mean size are clipped.
 TEST(KernelWindow, LimitedTargetsKeepAnOutlierOut) {
-  KernelWindow window(Numbers{0.0}, Numbers{1.0}, 1, 50, 1.0, 0.1, 20.0);
+  KernelWindow window(Numbers{0.0}, Numbers{1.0}, 1, 50, 1.0, 0.1, /*target_limit=*/20.0);
   for (int i = 0; i < 40; ++i) window.learn(Numbers{input_of(i)}, Numbers{i % 2 ? 1.0 : -1.0});
   window.learn(Numbers{0.5}, Numbers{1e9});
   EXPECT_LT(std::abs(predicted(window, {0.5})), 20.0);
 }
 
+// Indices of different speeds combine the extremes.
 TEST(KernelWindow, StaysFiniteForAnyNumbers) {
   const Numbers extremes{0.0,    1.0,  -1.0,  1e-310, -5e-324,  1e300,
                          -1e300, kMax, -kMax, kNaN,   INFINITY, -INFINITY};
@@ -98,8 +105,8 @@ TEST(KernelWindow, StaysFiniteForAnyNumbers) {
   EXPECT_NEAR(predicted(window, {0.0, 0.0}), 1.0, 0.01);
 }
 
-TEST(KernelWindow, RestoresItsState) {
-  KernelWindow window(Numbers{0.0}, Numbers{1.0}, 1, 10, 1.0, 0.1), other = window;
+TEST(KernelWindow, RestoresItsStateAndRefusesAnIncompleteOne) {
+  KernelWindow window = window_of(10), other = window;
   for (int i = 0; i < 25; ++i) window.learn(Numbers{input_of(i)}, Numbers{std::cos(i)});
   core::restore(other, core::state_of(window));
   for (int i = 25; i < 40; ++i) {
@@ -113,17 +120,18 @@ TEST(KernelWindow, RestoresItsState) {
 }
 
 TEST(KernelWindow, NamesAWrongArgument) {
-  const auto made = [](double low, std::size_t capacity, double scale, double ridge, double limit) {
+  const auto error_of = [](double low, std::size_t capacity, double scale, double ridge,
+                           double limit) {
     return testing::message_of([&] {
       const KernelWindow window(Numbers{low}, Numbers{1.0}, 1, capacity, scale, ridge, limit);
     });
   };
-  EXPECT_EQ(made(0.0, 1, 1.0, 0.1, 1.0), "capacity must be in [2, 4096], got 1");
-  EXPECT_EQ(made(0.0, 5, 0.0, 0.1, 1.0), "length_scale must be in [0.001, 1000], got 0");
-  EXPECT_EQ(made(0.0, 5, 1.0, 0.0, 1.0), "ridge must be in [0.001, 1000], got 0");
-  EXPECT_EQ(made(0.0, 5, 1.0, 0.1, 0.0), "target_limit must be at least 1, got 0");
-  EXPECT_EQ(made(2.0, 5, 1.0, 0.1, 1.0), "high must be at least low, got 1");
-  KernelWindow window(Numbers{0.0}, Numbers{1.0}, 1, 5, 1.0, 0.1);
+  EXPECT_EQ(error_of(0.0, 1, 1.0, 0.1, 1.0), "capacity must be in [2, 4096], got 1");
+  EXPECT_EQ(error_of(0.0, 5, 0.0, 0.1, 1.0), "length_scale must be in [0.001, 1000], got 0");
+  EXPECT_EQ(error_of(0.0, 5, 1.0, 0.0, 1.0), "ridge must be in [0.001, 1000], got 0");
+  EXPECT_EQ(error_of(0.0, 5, 1.0, 0.1, 0.0), "target_limit must be at least 1, got 0");
+  EXPECT_EQ(error_of(2.0, 5, 1.0, 0.1, 1.0), "high must be at least low, got 1");
+  KernelWindow window = window_of(5);
   EXPECT_THROW(window.learn(Numbers{1.0}, Numbers{kNaN}), std::invalid_argument);
   EXPECT_THROW(window.learn(Numbers{}, Numbers{1.0}), std::invalid_argument);
   EXPECT_THROW(predicted(window, {1.0, 2.0}), std::invalid_argument);

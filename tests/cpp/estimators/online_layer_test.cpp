@@ -44,7 +44,7 @@ PDeltaRule rule_for(const Problem& stream) {
 }
 
 /// Presents a stream, and expects counts, potentials and bits to be those of plain training.
-void expect_plain_bits(const Problem& problem) {
+void expect_online_bits_of_plain_training(const Problem& problem) {
   const auto plain_layer = testing::layer_for(problem);
   const auto layer = testing::layer_for(problem);
   auto plain = testing::trainer_for(problem, plain_layer, TrainingForm::plain);
@@ -64,18 +64,20 @@ void expect_plain_bits(const Problem& problem) {
     ASSERT_EQ(potentials, expected);
   }
   online.synchronize();
-  ASSERT_EQ(testing::bits_of(*layer), testing::bits_of(*plain_layer));
+  ASSERT_EQ(testing::parameters_of(*layer), testing::parameters_of(*plain_layer));
 }
 
 TEST(OnlineLayer, HasTheBitsOfPlainTraining) {
-  for (std::uint64_t seed = 0; seed < 100; ++seed) expect_plain_bits(testing::random_problem(seed));
+  for (std::uint64_t seed = 0; seed < 100; ++seed)
+    expect_online_bits_of_plain_training(testing::random_problem(seed));
   testing::on_every_instruction_set([](auto /*level*/) {
     for (std::uint64_t seed = 100; seed < 110; ++seed) {
-      expect_plain_bits(testing::random_problem(seed));
+      expect_online_bits_of_plain_training(testing::random_problem(seed));
     }
   });
 }
 
+// Training is stopped at several samples; then potentials and parameters are those before it.
 TEST(OnlineLayer, AStoppedPresentationChangesNothing) {
   for (std::uint64_t seed = 0; seed < 40; ++seed) {
     const Problem problem = testing::random_problem(seed);
@@ -83,7 +85,7 @@ TEST(OnlineLayer, AStoppedPresentationChangesNothing) {
     OnlineLayer online(layer);
     const Problem stream = stream_of(problem, problem.orders[0]);
     PDeltaRule rule = rule_for(stream);
-    const auto before = testing::bits_of(*layer);
+    const auto before = testing::parameters_of(*layer);
     const auto n_samples = static_cast<int>(problem.orders[0].size());
     for (int stop = 0; stop < n_samples; stop += 1 + n_samples / 5) {
       {
@@ -97,12 +99,13 @@ TEST(OnlineLayer, AStoppedPresentationChangesNothing) {
       layer->potentials(stream.bins, 1, expected);
       ASSERT_EQ(potentials, expected);
     }
-    const OnlineLayer fresh(layer);
+    EXPECT_NO_THROW(OnlineLayer{layer});
     online.synchronize();
-    ASSERT_EQ(testing::bits_of(*layer), before);
+    ASSERT_EQ(testing::parameters_of(*layer), before);
   }
 }
 
+// With weights at their limit, corrections towards no or all firing units increase some beyond it.
 TEST(OnlineLayer, AnOverflowOfAWeightChangesNothing) {
   Problem problem = testing::random_problem(1);
   const std::size_t n_columns = problem.code->n_columns();
@@ -112,7 +115,7 @@ TEST(OnlineLayer, AnOverflowOfAWeightChangesNothing) {
   const auto layer = std::make_shared<estimators::ParallelPerceptron>(problem.code, problem.n_units,
                                                                       weights, thresholds);
   OnlineLayer online(layer);
-  const auto before = testing::bits_of(*layer);
+  const auto before = testing::parameters_of(*layer);
   bool threw = false;
   for (const double target : {0.0, static_cast<double>(problem.n_units)}) {
     std::fill(problem.targets.begin(), problem.targets.end(), target);
@@ -125,7 +128,7 @@ TEST(OnlineLayer, AnOverflowOfAWeightChangesNothing) {
   }
   EXPECT_TRUE(threw);
   online.synchronize();
-  EXPECT_EQ(testing::bits_of(*layer), before);
+  EXPECT_EQ(testing::parameters_of(*layer), before);
 }
 
 TEST(OnlineLayer, RefusesWeightsBeyond14BitsAndBadArguments) {

@@ -41,10 +41,10 @@ TEST(ParallelPerceptron, PotentialsAndCountsAreAsWorkedByHand) {
   EXPECT_EQ(potentials, (std::vector<std::int32_t>{1 + 2 - 3 - 1, -4 + 5 - 6 + 2,  //
                                                    -1 + 2 + 3 - 1, 4 + 5 + 6 + 2}));
   std::vector<std::int32_t> counts(2);  // units with a positive potential: -1, -3; then 3, 17
-  layer.counts(bins, 1, 1, counts);
+  layer.counts(bins, /*n_groups=*/1, /*n_threads=*/1, counts);
   EXPECT_EQ(counts, (std::vector<std::int32_t>{0, 2}));
   counts.resize(4);
-  layer.counts(bins, 2, 1, counts);
+  layer.counts(bins, /*n_groups=*/2, /*n_threads=*/1, counts);
   EXPECT_EQ(counts, (std::vector<std::int32_t>{0, 0, 1, 1}));
 }
 
@@ -91,15 +91,15 @@ TEST(ParallelPerceptron, BlocksOfQueriesHaveThePotentialsOfSingleOnes) {
 
 TEST(ParallelPerceptron, CountsOfSeveralLayersEqualThoseOfEachLayer) {
   const auto code = code_of_three(130);
-  const ParallelPerceptron narrow(code, 100, 5, 3);
-  const ParallelPerceptron wide(code, 100, 6, 100000);
+  const ParallelPerceptron narrow(code, 100, 5, /*initial_range=*/3);
+  const ParallelPerceptron wide(code, 100, 6, /*initial_range=*/100000);
   const ParallelPerceptron* const layers[] = {&narrow, &wide, &narrow};
   core::Random random(8, core::Stream::exploration);
   for (const std::size_t n_queries : {0U, 5U, 700U}) {
     std::vector<std::int32_t> bins(3 * n_queries);
     for (auto& bin : bins) bin = static_cast<std::int32_t>(random.below(40));
-    std::vector<std::int32_t> together(3 * n_queries * 4);
-    ParallelPerceptron::counts(layers, bins, 4, 2, together);
+    std::vector<std::int32_t> together(3 * n_queries * 4);  // of 3 layers with 4 groups of units
+    ParallelPerceptron::counts(layers, bins, /*n_groups=*/4, /*n_threads=*/2, together);
     std::vector<std::int32_t> expected;
     for (const ParallelPerceptron* const layer : layers) {
       std::vector<std::int32_t> alone(n_queries * 4);
@@ -118,21 +118,22 @@ TEST(ParallelPerceptron, CountsOfSeveralLayersEqualThoseOfEachLayer) {
 TEST(ParallelPerceptron, RethrowsTheErrorOfAThread) {
   const std::vector<std::int32_t> weights(6);
   const ParallelPerceptron layer(small_code(), 2, weights, std::vector<std::int32_t>(2));
-  const std::vector<std::int32_t> bins(2000);
+  const std::vector<std::int32_t> bins(2000);  // of 2000 queries
   for (const std::size_t query : {0U, 999U, 1999U}) {
     const auto consume = [&](std::size_t q, const std::int32_t*) {
       if (q == query) throw std::bad_alloc();
     };
-    EXPECT_THROW(layer.for_each_query(bins, 3, consume), std::bad_alloc) << query;
+    EXPECT_THROW(layer.for_each_query(bins, /*n_threads=*/3, consume), std::bad_alloc) << query;
   }
 }
 
 TEST(ParallelPerceptron, DrawsEveryWeightInItsRange) {
-  const ParallelPerceptron layer(small_code(), 400, 3, 2);
-  std::vector<int> counts(5);
+  const ParallelPerceptron layer(small_code(), /*n_units=*/400, /*seed=*/3, /*initial_range=*/2);
+  std::vector<int> counts(5);  // of weights -2 to 2
   for (std::size_t i = 0; i < 400; ++i) {
-    for (std::size_t j = 0; j < 3; ++j)
+    for (std::size_t j = 0; j < 3; ++j) {
       ++counts.at(static_cast<std::size_t>(layer.weight(i, j) + 2));
+    }
   }
   for (const int n : counts) EXPECT_GT(n, 150);  // of 1200 weights; 240 on average
 }

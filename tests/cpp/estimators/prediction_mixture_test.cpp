@@ -35,6 +35,7 @@ TEST(PredictionMixture, StartsWithThePriorsAndEqualErrorsKeepThem) {
   EXPECT_EQ(mixture.weights(), (Numbers{0.75, 0.25}));
 }
 
+// Experts predict 0.1 and 1; targets are 0, then 1. learn(predictions, target).
 TEST(PredictionMixture, WeightsFollowADriftThatChangesTheBetterExpert) {
   PredictionMixture mixture(Numbers(2, 1.0));
   for (int i = 0; i < 1000; ++i) mixture.learn(Numbers{0.1, 1.0}, 0.0);
@@ -43,6 +44,7 @@ TEST(PredictionMixture, WeightsFollowADriftThatChangesTheBetterExpert) {
   EXPECT_GT(mixture.weights()[1], 0.99);
 }
 
+// The first of two experts is better, until a target of 1e300, for which both are equally wrong.
 TEST(PredictionMixture, AnOutlierDoesNotMakeExpertsAlike) {
   PredictionMixture mixture(Numbers(2, 1.0));
   for (int i = 0; i < 200; ++i) mixture.learn(Numbers{0.1, 0.3}, 0.0);
@@ -50,6 +52,7 @@ TEST(PredictionMixture, AnOutlierDoesNotMakeExpertsAlike) {
   EXPECT_GT(mixture.weights()[0], 0.8);
 }
 
+// Predictions and targets are multiplied by powers of two.
 TEST(PredictionMixture, WeightsDoNotDependOnTheUnitOfTargets) {
   const int exponents[]{-1000, -500, 0, 500, 1000};
   std::vector<Numbers> weights;
@@ -64,6 +67,7 @@ TEST(PredictionMixture, WeightsDoNotDependOnTheUnitOfTargets) {
   for (const Numbers& other : weights) EXPECT_EQ(other, weights[0]);
 }
 
+// Indices of different speeds combine the extremes.
 TEST(PredictionMixture, StaysFiniteForAnyNumbers) {
   const Numbers extremes{0.0, 1.0, -1.0, 5e-324, 1e300, -kMax, kMax, 1e-200, -1e154, 0.0, 0.0};
   PredictionMixture mixture(Numbers(3, 1.0));
@@ -79,7 +83,7 @@ TEST(PredictionMixture, StaysFiniteForAnyNumbers) {
   EXPECT_EQ(mixture.mix(Numbers{0.0, 0.0, 0.0}), 0.0);
 }
 
-TEST(PredictionMixture, RestoresItsStateAndNamesAWrongArgument) {
+TEST(PredictionMixture, RestoresItsStateAndRefusesWrongArguments) {
   PredictionMixture mixture(Numbers{4.0, 1.0}), other = mixture;
   for (int i = 0; i < 30; ++i) mixture.learn(Numbers{0.1, i % 3 * 1.0}, 0.0);
   core::restore(other, core::state_of(mixture));

@@ -72,7 +72,7 @@ TEST(ProbabilityMixture, ProbabilitiesArePositiveAndSumToOneForAnyNumbers) {
   }
 }
 
-TEST(ProbabilityMixture, RestoresItsStateAndNamesAWrongArgument) {
+TEST(ProbabilityMixture, RestoresItsStateAndRefusesWrongArguments) {
   ProbabilityMixture mixture(1), other(1);
   for (int i = 0; i < 30; ++i) mixture.learn(Numbers{0.2, 0.8}, Numbers{i % 2 * 1.0, 0.5}, 1);
   core::restore(other, core::state_of(mixture));

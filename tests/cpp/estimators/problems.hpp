@@ -98,19 +98,20 @@ inline Problem with_samples(Problem problem, std::size_t n_samples, std::uint64_
   return problem;
 }
 
-/// All thresholds and weights.
-inline std::vector<std::int32_t> bits_of(const estimators::ParallelPerceptron& layer) {
-  std::vector<std::int32_t> bits(layer.thresholds().begin(), layer.thresholds().end());
+/// All thresholds, then all weights, unit by unit.
+inline std::vector<std::int32_t> parameters_of(const estimators::ParallelPerceptron& layer) {
+  std::vector<std::int32_t> parameters(layer.thresholds().begin(), layer.thresholds().end());
   for (std::size_t i = 0; i < layer.n_units(); ++i) {
-    for (std::size_t j = 0; j < layer.code().n_columns(); ++j) bits.push_back(layer.weight(i, j));
+    for (std::size_t j = 0; j < layer.code().n_columns(); ++j) {
+      parameters.push_back(layer.weight(i, j));
+    }
   }
-  return bits;
+  return parameters;
 }
 
 /// Expects the form's bits and counts to be those of plain training, epoch by epoch.
-template <class Expect>
-void compare_with_plain(const Problem& problem, estimators::TrainingForm form, int n_threads,
-                        const Expect& expect) {
+inline void expect_bits_of_plain_training(const Problem& problem, estimators::TrainingForm form,
+                                          int n_threads) {
   const auto plain_layer = layer_for(problem);
   const auto layer = layer_for(problem);
   auto plain = trainer_for(problem, plain_layer, estimators::TrainingForm::plain);
@@ -118,28 +119,30 @@ void compare_with_plain(const Problem& problem, estimators::TrainingForm form, i
   for (std::size_t epoch = 0; epoch < problem.orders.size(); ++epoch) {
     const auto expected = plain.present(problem.orders[epoch]);
     const auto corrections = trainer.present(problem.orders[epoch]);
-    expect(expected.n_samples == corrections.n_samples && expected.n_units == corrections.n_units);
+    ASSERT_EQ(corrections.n_samples, expected.n_samples);
+    ASSERT_EQ(corrections.n_units, expected.n_units);
     if (epoch % 2 == 0) continue;  // synchronized in the middle and at the end
     trainer.synchronize();
-    expect(bits_of(*plain_layer) == bits_of(*layer));
+    ASSERT_EQ(parameters_of(*layer), parameters_of(*plain_layer));
   }
 }
 
-/// The bits of plain training on random problems, on several threads and on every instruction set.
-inline void expect_bits_of_plain_training(estimators::TrainingForm form) {
+/// Expects these bits on random problems, with one to three threads, and on every instruction set.
+inline void expect_bits_of_plain_training_on_random_problems(estimators::TrainingForm form) {
   for (std::uint64_t seed = 0; seed < 150; ++seed) {
-    compare_with_plain(random_problem(seed), form, 1 + static_cast<int>(seed % 3),
-                       [&](bool same) { ASSERT_TRUE(same) << "problem " << seed; });
+    SCOPED_TRACE(seed);
+    expect_bits_of_plain_training(random_problem(seed), form, 1 + static_cast<int>(seed % 3));
   }
   on_every_instruction_set([&](auto level) {
+    SCOPED_TRACE(level);
     for (std::uint64_t seed = 200; seed < 220; ++seed) {
-      compare_with_plain(random_problem(seed), form, 1,
-                         [&](bool same) { ASSERT_TRUE(same) << level << ", problem " << seed; });
+      expect_bits_of_plain_training(random_problem(seed), form, /*n_threads=*/1);
     }
   });
 }
 
-/// The problem with rounds in the order of the data instead, several in one order where `at_once`.
+/// The problem with `n_rounds` epochs in the order of the data; with `at_once`, each of its orders
+/// repeats the data `n_rounds` times instead.
 inline Problem in_data_order(Problem problem, std::size_t n_rounds, bool at_once = false) {
   const std::size_t n_samples = problem.bins.size() / problem.code->n_inputs();
   for (auto& order : problem.orders) {

@@ -47,6 +47,7 @@ TEST(RecursiveLeastSquares, FollowsAChangeSoonerTheMoreItForgets) {
   EXPECT_GT(predicted(slow, {0.4}), 0.1);
 }
 
+// Input 0 is in [10, 20]; input 1 is always 5 and does not count.
 TEST(RecursiveLeastSquares, MissingInputsAreTheMiddleOfTheirFirstRange) {
   RecursiveLeastSquares model(Numbers{10.0, 5.0}, Numbers{20.0, 5.0}, 1, 0.99);
   for (int i = 0; i < 20; ++i) model.learn(Numbers{10.0 + i % 11, 5.0}, Numbers{3.0 * (i % 11)});
@@ -101,6 +102,7 @@ TEST(RecursiveLeastSquares, LimitedErrorsKeepAnOutlierOut) {
   EXPECT_GT(predicted(unlimited, {}), 1e6);  // about a hundredth of 1e9
 }
 
+// Indices of different speeds combine the extremes.
 TEST(RecursiveLeastSquares, StaysFiniteForAnyNumbers) {
   const Numbers extremes{0.0,    -0.0,  1.0,    -1.0,  1e-310, -5e-324,  1e300,
                          -1e300, -kMax, kMax,   kNaN,  1e-300, 1e154,    -1e154,
@@ -120,7 +122,7 @@ TEST(RecursiveLeastSquares, StaysFiniteForAnyNumbers) {
   }
 }
 
-TEST(RecursiveLeastSquares, RestoresItsState) {
+TEST(RecursiveLeastSquares, RestoresItsStateAndRefusesAnIncompleteOne) {
   RecursiveLeastSquares model(Numbers{0.0, 0.0}, Numbers{1.0, 2.0}, 2, 0.98, 20.0), other = model;
   const auto learn = [](RecursiveLeastSquares& learner, int i) {
     learner.learn(Numbers{i % 7 / 6.0, i % 5 / 2.0}, Numbers{i % 3 * 1.0, i % 4 * 1.0});
@@ -138,17 +140,17 @@ TEST(RecursiveLeastSquares, RestoresItsState) {
 }
 
 TEST(RecursiveLeastSquares, NamesAWrongArgument) {
-  const auto made = [](const Numbers& low, const Numbers& high, std::size_t n, double forgetting,
-                       double limit) {
+  const auto error_of = [](const Numbers& low, const Numbers& high, std::size_t n,
+                           double forgetting, double limit) {
     return testing::message_of(
         [&] { const RecursiveLeastSquares model(low, high, n, forgetting, limit); });
   };
-  EXPECT_EQ(made({0.0}, {1.0}, 1, 0.4, 1.0), "forgetting must be in [0.5, 1], got 0.4");
-  EXPECT_EQ(made({0.0}, {1.0}, 1, 0.9, 0.5), "error_limit must be at least 1, got 0.5");
-  EXPECT_EQ(made({0.0}, {1.0}, 0, 0.9, 1.0), "n_outputs must be in [1, 1048576], got 0");
-  EXPECT_EQ(made({2.0}, {1.0}, 1, 0.9, 1.0), "high must be at least low, got 1");
-  EXPECT_EQ(made({kNaN}, {1.0}, 1, 0.9, 1.0), "low must be finite, got nan");
-  EXPECT_EQ(made({0.0}, {}, 1, 0.9, 1.0), "high must be 1 values, got 0");
+  EXPECT_EQ(error_of({0.0}, {1.0}, 1, 0.4, 1.0), "forgetting must be in [0.5, 1], got 0.4");
+  EXPECT_EQ(error_of({0.0}, {1.0}, 1, 0.9, 0.5), "error_limit must be at least 1, got 0.5");
+  EXPECT_EQ(error_of({0.0}, {1.0}, 0, 0.9, 1.0), "n_outputs must be in [1, 1048576], got 0");
+  EXPECT_EQ(error_of({2.0}, {1.0}, 1, 0.9, 1.0), "high must be at least low, got 1");
+  EXPECT_EQ(error_of({kNaN}, {1.0}, 1, 0.9, 1.0), "low must be finite, got nan");
+  EXPECT_EQ(error_of({0.0}, {}, 1, 0.9, 1.0), "high must be 1 values, got 0");
   auto model = unit_model(2);
   model.add_outputs(1);
   Numbers out(2);

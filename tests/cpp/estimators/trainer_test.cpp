@@ -38,14 +38,14 @@ TEST(Trainer, CorrectionsStopBeforeAPotentialOverflows) {
 TEST(Trainer, RefusesBadArgumentsAndDoesNotChangeTheLayer) {
   const auto problem = testing::random_problem(1);
   const auto layer = testing::layer_for(problem);
-  const auto before = testing::bits_of(*layer);
+  const auto before = testing::parameters_of(*layer);
   auto trainer = testing::trainer_for(problem, layer, TrainingForm::automatic);
   EXPECT_NE(trainer.form(), TrainingForm::automatic);
   EXPECT_THROW(trainer.present(std::vector<std::int32_t>{0, -1}), std::invalid_argument);
   EXPECT_THROW(trainer.present(std::vector<std::int32_t>{0, 1000}), std::invalid_argument);
   EXPECT_EQ(trainer.present({}).n_samples, 0U);
   trainer.synchronize();
-  EXPECT_EQ(testing::bits_of(*layer), before);
+  EXPECT_EQ(testing::parameters_of(*layer), before);
   EXPECT_THROW(testing::trainer_for(problem, layer, TrainingForm::plain, 0), std::invalid_argument);
   auto fewer = problem;
   fewer.targets.resize(fewer.targets.size() - fewer.n_groups);

@@ -69,8 +69,9 @@ TEST(TrainingForm, IsBlockForManySamplesOfLongCodes) {
   EXPECT_EQ(chosen(20000, 280), TrainingForm::block);
 }
 
-/// Processor seconds of both forms were measured at these sizes, 20 pairs of 800 units: set-up and
-/// synchronization, then an epoch. Where the ratio is below 1.3 either choice is good.
+// Processor seconds of both forms were measured for 20 pairs of 800 pattern units and 280 units:
+// `once` for set-up and synchronization, and per epoch. Where the ratio of the sums is below 1.3,
+// either choice is good.
 TEST(TrainingForm, IsTheFasterFormByMeasuredTimes) {
   struct Measured {
     std::size_t n_samples;

@@ -12,7 +12,7 @@ namespace sdnn {
 namespace {
 
 TEST(BlockTraining, HasTheBitsOfPlainTraining) {
-  testing::expect_bits_of_plain_training(estimators::TrainingForm::block);
+  testing::expect_bits_of_plain_training_on_random_problems(estimators::TrainingForm::block);
 }
 
 // From the second epoch in the order of the data on, plans of blocks are kept and reused.
@@ -20,9 +20,9 @@ TEST(BlockTraining, HasTheBitsOfPlainTrainingWithKeptPlans) {
   for (std::uint64_t seed = 300; seed < 330; ++seed) {
     auto problem = testing::in_data_order(testing::random_problem(seed), /*n_rounds=*/6);
     if (seed % 2 == 0) problem.orders[3] = {0};  // a single sample between epochs
-    const int n_threads = 1 + static_cast<int>(seed % 3);
-    testing::compare_with_plain(problem, estimators::TrainingForm::block, n_threads,
-                                [&](bool same) { ASSERT_TRUE(same) << "problem " << seed; });
+    SCOPED_TRACE(seed);
+    testing::expect_bits_of_plain_training(problem, estimators::TrainingForm::block,
+                                           /*n_threads=*/1 + static_cast<int>(seed % 3));
   }
 }
 
@@ -35,18 +35,16 @@ TEST(BlockTraining, HasTheBitsOfPlainTrainingOverSeveralBlocks) {
   for (const std::size_t limit : {kWithPlans, kWithoutPlans}) {
     const auto plain_layer = testing::layer_for(problem);
     const auto block_layer = testing::layer_for(problem);
-    const auto rule = [&] {
-      return estimators::PDeltaRule(problem.n_units, problem.targets, problem.n_groups);
-    };
+    const estimators::PDeltaRule rule(problem.n_units, problem.targets, problem.n_groups);
     auto plain = testing::trainer_for(problem, plain_layer, estimators::TrainingForm::plain);
-    estimators::PDeltaTrainer block(block_layer, problem.bins, rule(),
-                                    estimators::TrainingForm::block, limit, 2);
+    estimators::PDeltaTrainer block(block_layer, problem.bins, rule,
+                                    estimators::TrainingForm::block, limit, /*n_threads=*/2);
     EXPECT_LE(block.memory(), limit);
     for (const auto& order : problem.orders) {
       ASSERT_EQ(plain.present(order).n_units, block.present(order).n_units);
     }
     block.synchronize();
-    EXPECT_EQ(testing::bits_of(*plain_layer), testing::bits_of(*block_layer));
+    EXPECT_EQ(testing::parameters_of(*plain_layer), testing::parameters_of(*block_layer));
   }
 }
 
@@ -58,12 +56,9 @@ TEST(BlockTraining, HasTheBitsOfPlainTrainingWithWeightsBeyond16Bits) {
     std::vector<std::int32_t> weights(problem.n_units * n_columns);
     for (std::size_t i = 0; i < weights.size(); ++i) weights[i] = i % 2 == 0 ? start : -start;
     const std::vector<std::int32_t> thresholds(problem.n_units);
-    const auto layer = [&] {
-      return std::make_shared<estimators::ParallelPerceptron>(problem.code, problem.n_units,
-                                                              weights, thresholds);
-    };
-    const auto plain_layer = layer();
-    const auto block_layer = layer();
+    const auto plain_layer = std::make_shared<estimators::ParallelPerceptron>(
+        problem.code, problem.n_units, weights, thresholds);
+    const auto block_layer = std::make_shared<estimators::ParallelPerceptron>(*plain_layer);
     auto plain = testing::trainer_for(problem, plain_layer, estimators::TrainingForm::plain);
     auto block = testing::trainer_for(problem, block_layer, estimators::TrainingForm::block, 2);
     for (int epoch = 0; epoch < 20; ++epoch) {
@@ -72,7 +67,7 @@ TEST(BlockTraining, HasTheBitsOfPlainTrainingWithWeightsBeyond16Bits) {
       }
     }
     block.synchronize();
-    EXPECT_EQ(testing::bits_of(*plain_layer), testing::bits_of(*block_layer));
+    EXPECT_EQ(testing::parameters_of(*plain_layer), testing::parameters_of(*block_layer));
   }
 }
 

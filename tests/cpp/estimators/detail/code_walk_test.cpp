@@ -21,8 +21,10 @@ using estimators::kChunkColumns;
 using estimators::kChunkWords;
 using estimators::WeightTiles;
 
-/// A code, six codes that each differ from the one before in up to 9 slots, and an unrelated code.
-std::vector<testing::Code> some_codes(std::size_t n_words, core::Random& random) {
+/// Eight codes: six differ from the one before in up to 9 slots, the last one in about half of
+/// them.
+std::vector<testing::Code> neighbours_and_a_distant_code(std::size_t n_words,
+                                                         core::Random& random) {
   std::vector<testing::Code> codes{testing::random_code(n_words, random)};
   for (int k = 0; k < 6; ++k) codes.push_back(testing::neighbour_of(codes.back(), 9, random));
   codes.push_back(testing::random_code(n_words, random));
@@ -44,17 +46,17 @@ CodeWalk walk_through(const std::vector<testing::Code>& codes, std::size_t n_wor
   return walk;
 }
 
-/// Checks sums over codes of random weights in [-largest, largest]. A walk computes the sums of a
-/// code from those of the code before it.
+/// Expects exact sums over codes of random weights in [-largest, largest]. A walk computes the sums
+/// of a code from those of the code before it.
 template <class Weight>
-void check_walk(std::int32_t largest) {
+void expect_exact_walk_sums(std::int32_t largest) {
   core::Random random(8, core::Stream::weights);
   // Potential k is the start plus the sums of the codes first[k] and second[k].
   constexpr std::int32_t kStart = 11;
   const std::vector<std::uint16_t> first{3, 2, 2, 0, 4, 5, 7, 6, 1, 7};
   const std::vector<std::uint16_t> second{0, 1, 2, 3, 4, 5, 6, 7, 7, 6};
   for (const std::size_t n_words : {std::size_t{1}, std::size_t{2}, kChunkWords}) {
-    const auto codes = some_codes(n_words, random);
+    const auto codes = neighbours_and_a_distant_code(n_words, random);
     for (std::size_t width = 16; width <= estimators::kMostUnits<Weight>; width += 16) {
       core::AlignedBuffer<Weight> rows(kChunkColumns * width);
       for (auto& weight : rows.span()) {
@@ -86,13 +88,14 @@ void check_walk(std::int32_t largest) {
 }
 
 TEST(CodeWalk, SumsOfStepsEqualSumsOfCodes) {
-  check_walk<std::int16_t>(63);  // 2 codes * 256 columns * 63 < 2^15
-  check_walk<std::int32_t>(1000000);
+  expect_exact_walk_sums<std::int16_t>(63);  // 2 codes * 256 columns * 63 < 2^15
+  expect_exact_walk_sums<std::int32_t>(1000000);
 }
 
 TEST(CodeWalk, StartsDistantCodesFromZero) {
   core::Random random(9, core::Stream::weights);
-  const CodeWalk walk = walk_through(some_codes(kChunkWords, random), kChunkWords);
+  const CodeWalk walk =
+      walk_through(neighbours_and_a_distant_code(kChunkWords, random), kChunkWords);
   EXPECT_FALSE(walk.steps[3].from_zero);  // a neighbour of the code before
   EXPECT_TRUE(walk.steps.back().from_zero);
 }

@@ -11,17 +11,18 @@ namespace sdnn {
 namespace {
 
 TEST(DualTraining, HasTheBitsOfPlainTraining) {
-  testing::expect_bits_of_plain_training(estimators::TrainingForm::dual);
+  testing::expect_bits_of_plain_training_on_random_problems(estimators::TrainingForm::dual);
 }
 
 // In the order of the data, corrections depend on each other.
 TEST(DualTraining, HasTheBitsOfPlainTrainingInDataOrder) {
   for (std::uint64_t seed = 300; seed < 340; ++seed) {
     for (const bool at_once : {false, true}) {
-      testing::compare_with_plain(
-          testing::in_data_order(testing::random_problem(seed), 20, at_once),
-          estimators::TrainingForm::dual, 1 + static_cast<int>(seed % 3),
-          [&](bool same) { ASSERT_TRUE(same) << "problem " << seed; });
+      SCOPED_TRACE(seed);
+      const auto problem =
+          testing::in_data_order(testing::random_problem(seed), /*n_rounds=*/20, at_once);
+      testing::expect_bits_of_plain_training(problem, estimators::TrainingForm::dual,
+                                             /*n_threads=*/1 + static_cast<int>(seed % 3));
     }
   }
 }
@@ -29,9 +30,8 @@ TEST(DualTraining, HasTheBitsOfPlainTrainingInDataOrder) {
 TEST(DualTraining, HasTheBitsOfPlainTrainingOverManyWindows) {
   constexpr std::size_t kManyWindows = 1500;  // samples, of up to 128 in a window
   const auto problem = testing::with_samples(testing::random_problem(11), kManyWindows, 11);
-  testing::compare_with_plain(testing::in_data_order(problem, /*n_rounds=*/4),
-                              estimators::TrainingForm::dual, 2,
-                              [](bool same) { ASSERT_TRUE(same); });
+  testing::expect_bits_of_plain_training(testing::in_data_order(problem, /*n_rounds=*/4),
+                                         estimators::TrainingForm::dual, /*n_threads=*/2);
 }
 
 TEST(DualTraining, HasTheBitsOfPlainTrainingWithCoefficientsNearOverflow) {
@@ -46,8 +46,7 @@ TEST(DualTraining, HasTheBitsOfPlainTrainingWithCoefficientsNearOverflow) {
   for (auto& order : problem.orders) {
     for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<std::int32_t>(i % 2);
   }
-  testing::compare_with_plain(problem, estimators::TrainingForm::dual, 1,
-                              [](bool same) { ASSERT_TRUE(same); });
+  testing::expect_bits_of_plain_training(problem, estimators::TrainingForm::dual, /*n_threads=*/1);
 }
 
 TEST(DualTraining, HasTheBitsOfPlainTrainingWithProductsBeyond16Bits) {
@@ -67,8 +66,7 @@ TEST(DualTraining, HasTheBitsOfPlainTrainingWithProductsBeyond16Bits) {
   problem.n_groups = 1;
   problem.targets = {0.0, 5.0, 2.0};
   problem.orders.assign(4, {0, 1, 2, 1, 0});
-  testing::compare_with_plain(problem, estimators::TrainingForm::dual, 1,
-                              [](bool same) { ASSERT_TRUE(same); });
+  testing::expect_bits_of_plain_training(problem, estimators::TrainingForm::dual, /*n_threads=*/1);
 }
 
 }  // namespace

@@ -23,7 +23,7 @@ TEST(PlainTraining, ACorrectionIsAsWorkedByHand) {
   const auto count = training.present(bins, rule);
   EXPECT_EQ(count.n_samples, 1U);
   EXPECT_EQ(count.n_units, 1U);
-  EXPECT_EQ(testing::bits_of(*layer),
+  EXPECT_EQ(testing::parameters_of(*layer),
             (std::vector<std::int32_t>{0, 0, -3, 0, 1, -1}));  // thresholds, weights
   EXPECT_EQ(training.present(bins, rule).n_samples, 0U);       // learned
 }

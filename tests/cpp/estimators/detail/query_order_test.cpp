@@ -20,7 +20,7 @@ TEST(QueryOrder, TheHilbertCurveVisitsEveryPointInStepsOfOne) {
     for (int i = 0; i < n_axes; ++i) n_points *= side;
     std::vector<std::vector<std::uint32_t>> point_at(n_points);
     for (std::size_t p = 0; p < n_points; ++p) {
-      std::vector<std::uint32_t> point;
+      std::vector<std::uint32_t> point;  // the digits of p in base `side`
       for (std::size_t rest = p, i = 0; i < static_cast<std::size_t>(n_axes); ++i, rest /= side) {
         point.push_back(static_cast<std::uint32_t>(rest % side));
       }

@@ -13,10 +13,10 @@
 namespace sdnn {
 namespace {
 
-/// Adds two thirds of 21 rows and subtracts the others, with entries in [-largest, largest], of
-/// which `n_per_sum` are summed before the sum is widened.
+/// Expects exact sums where two thirds of 21 rows are added and the others subtracted. Entries are
+/// up to `largest` in size; `n_per_sum` of them are summed before the sum is widened.
 template <class To, class Entry>
-void check_sums(std::int32_t largest, std::size_t n_per_sum) {
+void expect_exact_sums(std::int32_t largest, std::size_t n_per_sum) {
   core::Random random(4, core::Stream::weights);
   const auto span = static_cast<std::uint64_t>(2 * std::int64_t{largest} + 1);
   constexpr std::size_t kOffset = 5;
@@ -44,21 +44,24 @@ void check_sums(std::int32_t largest, std::size_t n_per_sum) {
 }
 
 TEST(SignedSums, AreExactForAllTypes) {
-  // The second number is that of the largest entries whose sum their type still holds.
-  check_sums<std::int16_t, std::int8_t>(1, 127);
-  check_sums<std::int32_t, std::int8_t>(127, 1);
-  check_sums<std::int32_t, std::int16_t>(4000, 8);
-  check_sums<std::int32_t, std::int16_t>(32767, 1);
-  check_sums<std::int32_t, std::int32_t>(1000000, std::numeric_limits<std::int32_t>::max());
+  // Arguments are the largest entry, and how many such entries their type still sums: 127 * 1,
+  // 8 * 4000 < 2^15.
+  expect_exact_sums<std::int16_t, std::int8_t>(1, 127);
+  expect_exact_sums<std::int32_t, std::int8_t>(127, 1);
+  expect_exact_sums<std::int32_t, std::int16_t>(4000, 8);
+  expect_exact_sums<std::int32_t, std::int16_t>(32767, 1);
+  expect_exact_sums<std::int32_t, std::int32_t>(1000000, std::numeric_limits<std::int32_t>::max());
 }
 
 TEST(SignedSums, OfNoColumnsDoNotChangeSums) {
   std::vector<std::int32_t> to(40, 9);
-  estimators::add_signed(to.data(), to.size(), estimators::SignedRows<std::int16_t>(), 0, 8);
+  const estimators::SignedRows<std::int16_t> no_rows;
+  estimators::add_signed(to.data(), to.size(), no_rows, /*offset=*/0, /*n_per_sum=*/8);
   EXPECT_EQ(to, std::vector<std::int32_t>(40, 9));
 }
 
-// A code's words are expanded to bytes in another order of words, in chunks of two words.
+// The words of a code are expanded to bytes in the order `words`, in chunks of two words; chunk c
+// begins at c * stride.
 TEST(SignedSums, ExpandedCodesHaveTheEntriesOfTheirWords) {
   core::Random random(10, core::Stream::weights);
   constexpr std::size_t kChunkWords = 2;
@@ -80,7 +83,7 @@ TEST(SignedSums, ExpandedCodesHaveTheEntriesOfTheirWords) {
 }
 
 template <class Product>
-void check_one_row() {
+void expect_exact_row() {
   const std::vector<Product> row{3, -4, 5};
   testing::on_every_instruction_set([&](auto level) {
     std::vector<std::int32_t> to{1000000, 2, 3, 4};
@@ -93,8 +96,8 @@ void check_one_row() {
 }
 
 TEST(SignedSums, EqualPlainSumsOfASingleRow) {
-  check_one_row<std::int16_t>();
-  check_one_row<std::int32_t>();
+  expect_exact_row<std::int16_t>();
+  expect_exact_row<std::int32_t>();
 }
 
 }  // namespace

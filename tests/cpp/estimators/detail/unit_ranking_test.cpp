@@ -14,6 +14,8 @@
 namespace sdnn {
 namespace {
 
+// A key has a unit's distance to the threshold in its high bits and the unit's index in its low
+// ones; units that do not fire, or that do, have none.
 TEST(UnitRanking, CountsFiringUnitsAndRanksUnitsByDistanceThenIndex) {
   constexpr int kIndexBits = 7;          // for fewer than 128 units
   constexpr std::int32_t kFarthest = 3;  // larger distances to the threshold count as this

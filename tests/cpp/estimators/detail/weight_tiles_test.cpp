@@ -55,7 +55,7 @@ TEST(WeightTiles, AddColumnsOfAllTiles) {
 }
 
 template <class Weight>
-void check_rows(std::int32_t largest, std::size_t n_per_sum) {
+void expect_exact_row_sums(std::int32_t largest, std::size_t n_per_sum) {
   core::Random random(1, core::Stream::weights);
   const auto span = static_cast<std::uint64_t>(2 * largest + 1);
   for (const std::size_t width : {16U, 32U, 48U, 64U, 80U, 96U}) {
@@ -80,10 +80,10 @@ void check_rows(std::int32_t largest, std::size_t n_per_sum) {
 }
 
 TEST(WeightTiles, RowsAreAddedExactly) {
-  // The second number is that of the largest weights whose sum 16 bits hold: 100 * 327 < 2^15.
-  check_rows<std::int16_t>(327, 100);
-  check_rows<std::int16_t>(32767, 1);
-  check_rows<std::int32_t>(100000, std::size_t{1} << 30);
+  // Arguments are the largest weight, and how many of them their type sums: 100 * 327 < 2^15.
+  expect_exact_row_sums<std::int16_t>(327, 100);
+  expect_exact_row_sums<std::int16_t>(32767, 1);
+  expect_exact_row_sums<std::int32_t>(100000, std::size_t{1} << 30);
 }
 
 TEST(WeightTiles, RowsTakeCoefficientsWhereTheCodeIsActive) {
@@ -93,7 +93,8 @@ TEST(WeightTiles, RowsTakeCoefficientsWhereTheCodeIsActive) {
     testing::on_every_instruction_set([&](auto level) {
       std::vector<std::int16_t> rows(64 * width, 1);
       // Slots 0, 2 and 63 are active, of which slot 0 is +1. Unit i has the coefficient 100 i.
-      estimators::add_outer(rows.data(), width, coefficients.data(), std::uint64_t{1} << 63 | 5, 1);
+      constexpr std::uint64_t kActive = std::uint64_t{1} << 63 | 0b101, kPositive = 1;
+      estimators::add_outer(rows.data(), width, coefficients.data(), kActive, kPositive);
       EXPECT_EQ(rows[width - 1], 1 + 100 * static_cast<int>(width - 1)) << level;
       EXPECT_EQ(rows[2 * width + 1], 1 - 100) << level;
       EXPECT_EQ(rows[63 * width + 2], 1 - 200) << level;
