@@ -50,8 +50,9 @@ class RecordingAgent {
 
 TEST(TimeAgentSteps, EachStepLearnsTheTransitionToANewStateAndActsThere) {
   RecordingAgent agent;
-  const Times times = time_agent_steps(agent, 3, 5);
+  const Times times = time_agent_steps(agent, /*n_repetitions=*/3, /*seed=*/5);
   EXPECT_EQ(times.size(), 3U);
+  // Begin an episode and act; then three times learn and act.
   EXPECT_EQ(agent.calls, "balalala");
   ASSERT_EQ(agent.learned.size(), 3U);
   core::Random random(5, core::Stream::exploration);

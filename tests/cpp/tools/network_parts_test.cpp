@@ -20,7 +20,7 @@ SDNNC small_network() {
 TEST(NetworkParts, ATimedCorrectionChangesTheRequestedNumberOfUnits) {
   NetworkParts parts(small_network(), 1);
   constexpr int kCorrected = 6;
-  parts.time_corrections(1, kCorrected);
+  parts.time_corrections(/*n_repetitions=*/1, kCorrected);
   int n_changed = 0;
   const SDNNC before = small_network();
   for (std::size_t i = 0; i < 100; ++i) {
@@ -42,7 +42,7 @@ TEST(NetworkParts, RefusesImpossibleNumbers) {
   EXPECT_THROW(parts.time_values(-1), std::invalid_argument);
   EXPECT_THROW(parts.time_corrections(1, 0), std::invalid_argument);
   EXPECT_THROW(parts.time_corrections(1, kActive + 1), std::invalid_argument);
-  EXPECT_THROW(parts.time_selections(1, 0, 5), std::invalid_argument);
+  EXPECT_THROW(parts.time_selections(1, /*n_selections=*/0, 5), std::invalid_argument);
   EXPECT_THROW(parts.time_selections(1, 1, kActive + 1), std::invalid_argument);
 }
 

@@ -43,20 +43,7 @@ TEST(PlainRBFNetwork, LearnsLikeTheFactoredNetwork) {
   EXPECT_TRUE(std::ranges::equal(plain.network().weights(), factored.weights()));
 }
 
-/// A network that has learned random targets in [-10, 10], so that its weights differ.
-Plain taught(const RBFNetworkConfig& config, int n_corrections) {
-  Plain network(config);
-  core::Random random(7, core::Stream::weights);
-  for (int i = 0; i < n_corrections; ++i) {
-    std::vector<double> state(network.n_inputs());
-    for (double& x : state) x = random.uniform();
-    const auto action = static_cast<std::size_t>(random.below(network.n_actions()));
-    network.update(state, action, 20.0 * random.uniform() - 10.0);
-  }
-  return network;
-}
-
-// Compares the sum over all joint bases with the product over the dimensions.
+// The plain network sums over all joint bases, the factored one multiplies over the dimensions.
 TEST(PlainRBFNetwork, HasTheValuesOfTheFactoredNetworkAtEverySize) {
   for (const int d : {1, 2, 3, 4}) {
     for (const RBFNetworkConfig& config :
@@ -64,7 +51,7 @@ TEST(PlainRBFNetwork, HasTheValuesOfTheFactoredNetworkAtEverySize) {
           RBFNetworkConfig{.n_inputs = d, .n_bases = 3, .n_actions = 5, .width = 0.4},
           RBFNetworkConfig{
               .n_inputs = d, .n_bases = 5, .n_actions = 2, .width = 0.1, .gradient_rate = 1.0}}) {
-      Plain plain = taught(config, 300);
+      Plain plain = testing::trained_at_random<Plain>(config, /*n_corrections=*/300);
       Factored factored(plain.network());
       double largest = 0.0;
       for (const double w : factored.weights()) largest = std::max(largest, std::abs(w));
@@ -72,8 +59,7 @@ TEST(PlainRBFNetwork, HasTheValuesOfTheFactoredNetworkAtEverySize) {
       core::Random random(2, core::Stream::ties);
       std::vector<double> expected(plain.n_actions()), out(plain.n_actions());
       for (int i = 0; i < 20; ++i) {
-        std::vector<double> state(plain.n_inputs());
-        for (double& x : state) x = random.uniform();
+        const auto state = testing::random_state(plain.n_inputs(), random);
         factored.values(state, expected);
         plain.values(state, out);
         for (std::size_t a = 0; a < out.size(); ++a) {

@@ -75,49 +75,39 @@ std::uint64_t digest(std::span<const TestRow> rows) {
   return hash;
 }
 
-// Golden traces: numbers of decisions and digests that were recorded once, and are the same on any
-// machine and compiler. There is a test episode after every 10 learning episodes.
-TEST(AcrobotTrial, GoldenTraceWithoutNoise) {
-  auto run = network_trial({.protocol = {.episodes = 200}});
-  run.advance(200);
-  ASSERT_EQ(run.rows().size(), 200U / 10);
-  EXPECT_EQ(run.n_decisions(), 2541);
-  EXPECT_EQ(digest(run.rows()), 15772045298543882794U);
+/// Expects a golden trace: a number of decisions and a digest of the rows that were recorded once,
+/// and are the same on any machine and compiler.
+template <class Trial>
+void expect_recorded(Trial trial, int n_episodes, int n_decisions, std::uint64_t rows_digest) {
+  trial.advance(n_episodes);
+  EXPECT_EQ(trial.rows().size(),
+            static_cast<std::size_t>(n_episodes) / 10);  // a row per 10 episodes
+  EXPECT_EQ(trial.n_decisions(), n_decisions);
+  EXPECT_EQ(digest(trial.rows()), rows_digest);
 }
 
-// The numbers were recorded once, like those above.
-TEST(AcrobotTrial, GoldenTraceWithNoisyRedundantSensors) {
-  auto run = network_trial(
-      {.sensors = {.n_sensors = 6, .noise = 0.02}, .protocol = {.episodes = 60}, .seed = 2});
-  run.advance(60);
-  ASSERT_EQ(run.rows().size(), 60U / 10);
-  EXPECT_EQ(run.n_decisions(), 1125);
-  EXPECT_EQ(digest(run.rows()), 899986753393664466U);
+constexpr Setting kPlain{.protocol = {.episodes = 200}};
+
+// Numbers are episodes, decisions and a hash of the rows.
+TEST(AcrobotTrial, DecisionsAndRowsOfSDNNCAreThoseRecordedOnce) {
+  const Setting noisy{
+      .sensors = {.n_sensors = 6, .noise = 0.02}, .protocol = {.episodes = 60}, .seed = 2};
+  expect_recorded(network_trial(kPlain), 200, 2541, 15772045298543882794U);
+  expect_recorded(network_trial(noisy), 60, 1125, 899986753393664466U);
 }
 
-// The numbers were recorded once, like those above.
-TEST(AcrobotTrial, GoldenTracesOfFuzzyQLearning) {
-  auto plain = agent_trial(fuzzy_agent({}), {.protocol = {.episodes = 200}});
-  plain.advance(200);
-  EXPECT_EQ(plain.n_decisions(), 973);
-  EXPECT_EQ(digest(plain.rows()), 16274018572413670715U);
-  const Setting setting{.sensors = {.n_sensors = 6, .noise = 0.02}, .seed = 2};
-  auto noisy = agent_trial(fuzzy_agent(setting), setting);
-  noisy.advance(100);
-  EXPECT_EQ(noisy.n_decisions(), 2674);
-  EXPECT_EQ(digest(noisy.rows()), 1660777440214468387U);
+// Numbers are episodes, decisions and a hash of the rows.
+TEST(AcrobotTrial, DecisionsAndRowsOfFuzzyQLearningAreThoseRecordedOnce) {
+  const Setting noisy{.sensors = {.n_sensors = 6, .noise = 0.02}, .seed = 2};
+  expect_recorded(agent_trial(fuzzy_agent(kPlain), kPlain), 200, 973, 16274018572413670715U);
+  expect_recorded(agent_trial(fuzzy_agent(noisy), noisy), 100, 2674, 1660777440214468387U);
 }
 
-// The numbers were recorded once, like those above.
-TEST(AcrobotTrial, GoldenTracesOfTheRBFNetwork) {
-  auto plain = rbf_trial({.protocol = {.episodes = 200}});
-  plain.advance(200);
-  EXPECT_EQ(plain.n_decisions(), 940);
-  EXPECT_EQ(digest(plain.rows()), 6814087891175944941U);
-  auto noisy = rbf_trial({.sensors = {.n_sensors = 5, .noise = 0.02}, .seed = 2});
-  noisy.advance(100);
-  EXPECT_EQ(noisy.n_decisions(), 986);
-  EXPECT_EQ(digest(noisy.rows()), 7920621632295173362U);
+// Numbers are episodes, decisions and a hash of the rows.
+TEST(AcrobotTrial, DecisionsAndRowsOfTheRBFNetworkAreThoseRecordedOnce) {
+  const Setting noisy{.sensors = {.n_sensors = 5, .noise = 0.02}, .seed = 2};
+  expect_recorded(rbf_trial(kPlain), 200, 940, 6814087891175944941U);
+  expect_recorded(rbf_trial(noisy), 100, 986, 7920621632295173362U);
 }
 
 // Eight trials of different sensors, lengths and seeds advance by the same numbers of decisions.
