@@ -4,14 +4,15 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <stdexcept>
 #include <vector>
 
+#include "agents/random_task.hpp"
 #include "sdnn/agents/detail/make_actor_critic.hpp"
 #include "sdnn/approximators/detail/state_wiring.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/core/state.hpp"
+#include "states.hpp"
 
 namespace sdnn::agents {
 namespace {
@@ -38,8 +39,7 @@ void learn_at_random(ActorCritic& agent, int n_steps, std::uint64_t seed) {
   core::Random random(seed, core::Stream::useless_inputs);
   State state{random.uniform(), random.uniform()};
   for (int step = 0; step < n_steps; ++step) {
-    const auto selected = agent.act(state);
-    const Indices action(selected.begin(), selected.end());
+    const Indices action = testing::copied(agent.act(state));
     const State next{random.uniform(), random.uniform()};
     const bool terminated = random.below(10) == 0;
     agent.learn(state, action, action.front() == 2 ? 1.0 : 0.0, next, terminated);
@@ -110,9 +110,8 @@ TEST(ActorCritic, RefusesBadTransitionsAndChangesNothing) {
   learn_at_random(agent, 50, 1);
   const core::State before = core::state_of(agent);
   const State a{0.1, 0.1};
-  const double infinity = std::numeric_limits<double>::infinity();
   EXPECT_THROW(agent.learn(a, Indices{3}, 0.0, a, false), std::invalid_argument);
-  EXPECT_THROW(agent.learn(a, Indices{0}, infinity, a, false), std::invalid_argument);
+  EXPECT_THROW(agent.learn(a, Indices{0}, testing::kInfinity, a, false), std::invalid_argument);
   EXPECT_THROW(agent.learn(a, Indices{0}, 1e301, a, false), std::invalid_argument);
   EXPECT_THROW(agent.learn(a, Indices{0}, 0.0, State{0.1, 1.1}, false), std::invalid_argument);
   EXPECT_THROW(agent.learn(a, Indices{0}, 0.0, a, false, 1), std::invalid_argument);

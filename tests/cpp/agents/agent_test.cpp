@@ -20,10 +20,9 @@ static_assert(Agent<QLearning<approximators::RBFNetwork>>);
 static_assert(Agent<FuzzyQLearning>);
 static_assert(!Agent<approximators::RBFNetwork>);
 
-// Only begin_episode restarts the count of greedy first steps, not a terminated transition. With
-// epsilon 1 at least four of five actions of the later 200 steps should not be the best one.
+// With epsilon 1 at least four of five actions of the later 200 steps should not be the best one.
 template <Agent A>
-void expect_that_learning_begins_no_episode(A agent) {
+void expect_random_actions_after_terminated_transitions(A agent) {
   const std::vector<double> state = {0.3}, next = {0.6};
   agent.begin_episode();
   agent.learn(state, agent.act(state), 1.0, next, false);  // the only greedy step
@@ -37,12 +36,14 @@ void expect_that_learning_begins_no_episode(A agent) {
   EXPECT_GT(n_exploring, 50);  // far fewer than expected, but impossible if steps were greedy
 }
 
+// Only begin_episode does; with epsilon 1 all other steps are random.
 TEST(Agent, ATerminatedTransitionDoesNotRestartTheGreedyFirstSteps) {
   const EpsilonGreedyConfig policy{
       .epsilon = 1.0, .n_greedy_steps = 1, .tie_rule = TieRule::lowest};
-  expect_that_learning_begins_no_episode(testing::OneDimension<QLearning<testing::LookupTable>>(
-      testing::LookupTable(1, 2, 5), {.policy = policy}, 1));
-  expect_that_learning_begins_no_episode(testing::OneDimension<FuzzyQLearning>(
+  expect_random_actions_after_terminated_transitions(
+      testing::OneDimension<QLearning<testing::LookupTable>>(testing::LookupTable(1, 2, 5),
+                                                             {.policy = policy}, 1));
+  expect_random_actions_after_terminated_transitions(testing::OneDimension<FuzzyQLearning>(
       approximators::FuzzyRules({.n_inputs = 1}), {.policy = policy}, 1));
 }
 

@@ -6,15 +6,14 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <limits>
 #include <optional>
 #include <stdexcept>
 #include <string>
-#include <utility>
 #include <variant>
 #include <vector>
 
+#include "agents/random_task.hpp"
 #include "errors.hpp"
 #include "folders.hpp"
 #include "sdnn/agents/actions.hpp"
@@ -34,8 +33,8 @@ constexpr double kUnknown = std::numeric_limits<double>::infinity();
 
 const Box kBounds{.low = {-1.0, -kUnknown}, .high = {1.0, kUnknown}};
 
-/// Small agents of every type, with all kinds of actions.
-std::vector<AgentSpec> specs() {
+/// Small agents of every type, with every type of actions.
+std::vector<AgentSpec> specs_of_every_agent() {
   std::vector<AgentSpec> all;
   for (const char* const agent : {"q-lambda", "actor-critic", "sdnn-c", "rbf", "fuzzy"}) {
     AgentSpec spec{.agent = agent,
@@ -58,14 +57,13 @@ std::vector<AgentSpec> specs() {
 /// Acts and learns in two environments with observations of two variables. They repeat with periods
 /// of 10 and 7 steps, and depend on no action.
 template <class Agent>
-void live(Agent& agent, int n_steps) {
+void act_and_learn_in_two_environments(Agent& agent, int n_steps) {
   agent.set_n_environments(2);
   for (int t = 0; t < n_steps; ++t) {
     const auto environment = static_cast<std::size_t>(t % 3 == 2);
     if (t % 17 < 3) agent.begin_episode(environment);
     const Vector observed{0.1 * (t % 10), 1.0 * (t % 7)}, next{0.1 * ((t + 1) % 10), 1.0};
-    const auto selected = agent.act(observed, true, environment);
-    const Vector action(selected.begin(), selected.end());
+    const Vector action = testing::copied(agent.act(observed, true, environment));
     agent.learn(observed, action, 1.0 * (t % 3) - action[0], next, t % 13 == 12, environment, {},
                 t % 4 == 3 ? 2.5 : 1.0);
   }
@@ -82,6 +80,7 @@ std::string error_of_setting(const std::string& name, const SettingValue& value)
   return error_with([&](AgentSpec& spec) { spec.settings[name] = value; });
 }
 
+// A compiled agent of the default preset with four settings equals a controller made of them.
 TEST(CompiledController, MakesLearnsAndWritesTheBitsOfTheController) {
   const testing::Folder folder;
   const auto preset = general_q_lambda_preset(4);
@@ -108,8 +107,8 @@ TEST(CompiledController, MakesLearnsAndWritesTheBitsOfTheController) {
   EXPECT_EQ(agent.n_variables(), 2U);
   EXPECT_EQ(agent.n_dimensions(), 1U);
   EXPECT_TRUE(agent.is_warming_up());
-  live(agent, 200);
-  live(file.controller, 200);
+  act_and_learn_in_two_environments(agent, 200);
+  act_and_learn_in_two_environments(file.controller, 200);
   EXPECT_FALSE(agent.is_warming_up());
   agent.write(folder / "agent");
   file.write(folder / "file");
@@ -118,10 +117,10 @@ TEST(CompiledController, MakesLearnsAndWritesTheBitsOfTheController) {
 
 TEST(CompiledController, AReadAgentOfEveryTypeContinuesLikeTheWrittenOneAndAnAgentFile) {
   const testing::Folder folder;
-  for (const AgentSpec& spec : specs()) {
+  for (const AgentSpec& spec : specs_of_every_agent()) {
     SCOPED_TRACE(spec.agent);
     CompiledController agent(spec);
-    live(agent, 60);
+    act_and_learn_in_two_environments(agent, 60);
     agent.set_progress(0.25);
     agent.write(folder / "agent");
     CompiledController read_agent(folder / "agent");
@@ -129,9 +128,9 @@ TEST(CompiledController, AReadAgentOfEveryTypeContinuesLikeTheWrittenOneAndAnAge
     EXPECT_EQ(file.description()["kind"], spec.agent);
     EXPECT_EQ(file.description()["learning"]["discount"], 0.5);
     EXPECT_EQ(file.controller.n_dimensions(), agent.n_dimensions());
-    live(agent, 40);
-    live(read_agent, 40);
-    live(file.controller, 40);
+    act_and_learn_in_two_environments(agent, 40);
+    act_and_learn_in_two_environments(read_agent, 40);
+    act_and_learn_in_two_environments(file.controller, 40);
     agent.write(folder / "agent");
     read_agent.write(folder / "read_agent");
     file.write(folder / "file");
@@ -194,8 +193,8 @@ TEST(CompiledController, NamesWhatIsWrongWithASetting) {
   EXPECT_NE(size.find("max_table_bytes is 1000"), std::string::npos) << size;
 }
 
-// A history computes with readings, so it needs a number for each. With missing = "code" there is
-// none, and the preset's history is left out; one that the user sets is an error.
+// A history computes with numbers. With missing = "code" a missing one has a bin of its own
+// instead, so the preset's history is left out; a history that the user sets is an error.
 TEST(CompiledController, CodedMissingReadingsLeaveOutThePresetsHistory) {
   EXPECT_EQ(error_of_setting("observation.missing", "code"), "no error");
   EXPECT_NE(error_with([](AgentSpec& spec) {

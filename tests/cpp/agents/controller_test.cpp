@@ -10,14 +10,15 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <variant>
 #include <vector>
 
 #include "agents/one_dimension.hpp"
+#include "agents/random_task.hpp"
 #include "errors.hpp"
 #include "sdnn/core/random.hpp"
 #include "states.hpp"
-#include "threads.hpp"
 
 namespace sdnn::agents {
 namespace {
@@ -40,8 +41,9 @@ ObservationConfig pendulum() {
 // An angle of 0 is in the middle of -pi to pi; 4 is at 3/4 of -8 to 8, and 11 at 1/4 of 10 to 14.
 const Numbers kPendulumObserved = {1.0, 0.0, 4.0, 11.0}, kPendulumState = {0.5, 0.75, 0.25};
 
-ControllerConfig with(AnyApproximatorConfig approximator, AnyLearningConfig learning,
-                      std::size_t n_dimensions = 1) {
+/// A controller of the pendulum; actions have `n_dimensions` numbers in [-2, 2].
+ControllerConfig config_with(AnyApproximatorConfig approximator, AnyLearningConfig learning,
+                             std::size_t n_dimensions = 1) {
   return {.approximator = approximator,
           .learning = learning,
           .seed = 3,
@@ -53,22 +55,24 @@ ControllerConfig with(AnyApproximatorConfig approximator, AnyLearningConfig lear
 const RBFNetworkConfig kBases{.n_bases = 3, .n_actions = 5, .gradient_rate = 0.5};
 const FuzzyQLearningConfig kTraces{.trace_decay = 0.5};
 
-ControllerConfig rbf_config() { return with(kBases, QLearningConfig{.n_steps = 3}); }
-ControllerConfig rbf_of_vectors() { return with(kBases, QLearningConfig{}, 2); }
-ControllerConfig sdnn() {
-  return with(SDNNCConfig{.n_pattern_units = 16,
-                          .n_hidden_units = 60,
-                          .n_active_units = 40,
-                          .n_actions = 5,
-                          .averaging_interval = 5},
-              QLearningConfig{.policy = {.epsilon = 0.5, .n_greedy_steps = 0},
-                              .max_action_repeat = 4,
-                              .value_range = ValueRange::adaptive});
+ControllerConfig rbf_config() { return config_with(kBases, QLearningConfig{.n_steps = 3}); }
+ControllerConfig rbf_config_2d() { return config_with(kBases, QLearningConfig{}, 2); }
+ControllerConfig sdnn_config() {
+  return config_with(SDNNCConfig{.n_pattern_units = 16,
+                                 .n_hidden_units = 60,
+                                 .n_active_units = 40,
+                                 .n_actions = 5,
+                                 .averaging_interval = 5},
+                     QLearningConfig{.policy = {.epsilon = 0.5, .n_greedy_steps = 0},
+                                     .max_action_repeat = 4,
+                                     .value_range = ValueRange::adaptive});
 }
-ControllerConfig fuzzy_config() { return with(FuzzyRulesConfig{}, kTraces); }
-ControllerConfig fuzzy_of_vectors() { return with(FuzzyRulesConfig{.n_sets = 4}, kTraces, 2); }
+ControllerConfig fuzzy_config() { return config_with(FuzzyRulesConfig{}, kTraces); }
+ControllerConfig fuzzy_config_2d() {
+  return config_with(FuzzyRulesConfig{.n_sets = 4}, kTraces, 2);
+}
 
-ControllerConfig whole(ControllerConfig config) {
+ControllerConfig with_whole_actions(ControllerConfig config) {
   config.action.number = ActionNumber::whole;  // several indices are rounded to the same action
   return config;
 }
@@ -80,13 +84,12 @@ ControllerConfig with_warm_up(ControllerConfig config) {
 }
 
 Numbers action_of(Controller& controller, const Numbers& observed, std::size_t environment = 0) {
-  const auto action = controller.act(observed, true, environment);
-  return {action.begin(), action.end()};
+  return testing::copied(controller.act(observed, true, environment));
 }
 
 /// Acts and learns in a step of a task with random observations. With `is_saved`, a restored copy
 /// replaces the controller between acting and learning.
-void step(Controller& controller, core::Random& random, Numbers& observed, bool is_saved) {
+void learn_step(Controller& controller, core::Random& random, Numbers& observed, bool is_saved) {
   const Numbers action = action_of(controller, observed);
   for (const double a : action) ASSERT_LE(std::abs(a), 2.0);
   if (is_saved) {
@@ -108,33 +111,35 @@ void expect_exact_resume(const ControllerConfig& config, std::size_t n_environme
   core::Random random(5, core::Stream::weights), same(5, core::Stream::weights);
   Numbers observed{1.0, 0.0, 0.0, 0.0}, resumed_observed = observed;
   for (int t = 0; t < 90; ++t) {
-    step(uninterrupted, random, observed, false);
-    step(resumed, same, resumed_observed, t % 10 == 3);
+    learn_step(uninterrupted, random, observed, false);
+    learn_step(resumed, same, resumed_observed, t % 10 == 3);
   }
   EXPECT_EQ(core::state_of(uninterrupted), core::state_of(resumed));
   EXPECT_FALSE(uninterrupted.is_warming_up());
 }
 
+// Agents of every type, each also with whole actions, with a warm-up, and with both.
 TEST(Controller, ContinuesExactlyAfterItWasSavedAtAnyStep) {
   const LinearSDNNConfig linear{.n_pattern_units = 16, .n_actions = 5, .action_window = 3};
   for (const ControllerConfig& config :
-       {rbf_config(), rbf_of_vectors(), sdnn(), fuzzy_config(), fuzzy_of_vectors(),
-        with(linear, QLambdaConfig{.max_action_repeat = 5}, 2),
-        with(linear, ActorCriticConfig{}, 2)}) {
+       {rbf_config(), rbf_config_2d(), sdnn_config(), fuzzy_config(), fuzzy_config_2d(),
+        config_with(linear, QLambdaConfig{.max_action_repeat = 5}, /*n_dimensions=*/2),
+        config_with(linear, ActorCriticConfig{}, /*n_dimensions=*/2)}) {
     expect_exact_resume(config);
-    expect_exact_resume(whole(config));
+    expect_exact_resume(with_whole_actions(config));
     expect_exact_resume(with_warm_up(config));
-    expect_exact_resume(with_warm_up(whole(config)), /*n_environments=*/3);
+    expect_exact_resume(with_warm_up(with_whole_actions(config)), /*n_environments=*/3);
   }
 }
 
 // The pendulum's four variables are three inputs; each of two dimensions of actions has a network.
+// Index 0 to 4 of a dimension is an action of -2, -1, 0, 1 or 2.
 TEST(Controller, ActsAndLearnsLikeItsAgent) {
   RBFNetworkConfig bases = kBases;
   bases.n_inputs = 3;
   const RBFNetwork network(bases);
   QLearning<RBFNetwork> agent({network, network}, {}, 3);
-  Controller controller(rbf_of_vectors());
+  Controller controller(rbf_config_2d());
   EXPECT_EQ(controller.n_variables(), 4U);
   EXPECT_EQ(controller.n_dimensions(), 2U);
   EXPECT_EQ(std::get<RBFNetworkConfig>(controller.approximator()), bases);
@@ -143,7 +148,7 @@ TEST(Controller, ActsAndLearnsLikeItsAgent) {
     const auto indices = agent.act(kPendulumState);
     const Numbers action = action_of(controller, kPendulumObserved);
     ASSERT_EQ(action, (Numbers{static_cast<double>(indices[0]) - 2.0,
-                               static_cast<double>(indices[1]) - 2.0}));  // of -2, -1, 0, 1, 2
+                               static_cast<double>(indices[1]) - 2.0}));
     const double reward = action[0] == 2.0 ? 1.0 : 0.0;
     const bool terminated = t % 5 == 4;
     agent.learn(kPendulumState, indices, reward, kPendulumState, terminated);
@@ -156,14 +161,14 @@ TEST(Controller, ActsAndLearnsLikeItsAgent) {
             core::state_of(agent));
 }
 
-// Each reader has a separate workspace and random numbers.
-TEST(Controller, GivesTheSameActionsToConcurrentReaders) {
+// Each reader has a separate workspace and random numbers; best_of reads for the agent itself.
+TEST(Controller, GivesTheSameActionsToConcurrentReadersAndBestOfThoseOfGreedyActs) {
   for (const ControllerConfig& config :
-       {rbf_config(), rbf_of_vectors(), sdnn(), fuzzy_config(), fuzzy_of_vectors()}) {
+       {rbf_config(), rbf_config_2d(), sdnn_config(), fuzzy_config(), fuzzy_config_2d()}) {
     Controller controller(config);
     core::Random random(5, core::Stream::weights);
     Numbers observed{1.0, 0.0, 0.0, 0.0};
-    for (int t = 0; t < 60; ++t) step(controller, random, observed, false);
+    for (int t = 0; t < 60; ++t) learn_step(controller, random, observed, false);
     const Controller& shared = controller;
     const auto best = [&](std::size_t i) -> Numbers {
       auto workspace = shared.workspace();
@@ -178,7 +183,12 @@ TEST(Controller, GivesTheSameActionsToConcurrentReaders) {
       return actions;
     };
     // Threads read first, because the first reader computes the averaged weights for all.
-    const auto read_together = testing::in_threads(4, best);
+    std::array<Numbers, 4> read_together;
+    std::vector<std::thread> threads;
+    for (std::size_t i = 0; i < 4; ++i) {
+      threads.emplace_back([&, i] { read_together[i] = best(i); });
+    }
+    for (std::thread& thread : threads) thread.join();
     const std::array alone{best(0), best(1)};
     for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(read_together[i], alone[i % 2]);
 
@@ -225,7 +235,8 @@ TEST(Controller, WithSeveralEnvironmentsActsAndLearnsLikeItsAgent) {
 // exactly.
 TEST(Controller, LearnsTheIndexThatWasTakenOfEqualRoundedActions) {
   for (const bool is_removed : {false, true}) {  // removing the environment forgets its action
-    auto config = with(kBases, QLearningConfig{.policy = {.epsilon = 1.0, .n_greedy_steps = 0}});
+    auto config =
+        config_with(kBases, QLearningConfig{.policy = {.epsilon = 1.0, .n_greedy_steps = 0}});
     config.action = {.low = {0.0}, .high = {2.0}, .number = ActionNumber::whole};
     Controller controller(config);
     controller.set_n_environments(2);
@@ -252,7 +263,7 @@ TEST(Controller, LearnsTheIndexThatWasTakenOfEqualRoundedActions) {
 TEST(Controller, RefusesBadArgumentsAndChangesNothing) {
   const Numbers good(4, 0.5), shorter(3, 0.5), nan = {0.5, 0.5, testing::kNaN, 0.5};
   for (ControllerConfig config :
-       {rbf_config(), rbf_of_vectors(), fuzzy_config(), fuzzy_of_vectors()}) {
+       {rbf_config(), rbf_config_2d(), fuzzy_config(), fuzzy_config_2d()}) {
     for (const bool warms_up : {false, true}) {
       Controller controller(warms_up ? with_warm_up(config) : config);
       const Numbers action = action_of(controller, good);
@@ -301,11 +312,11 @@ TEST(Controller, RefusesStatesOfWrongSizeBeforeItAllocatesMemory) {
   const auto error_of = [](const ControllerConfig& config, const core::State& state) {
     return testing::message_of([&] { (void)Controller::restored(config, state); });
   };
-  ControllerConfig config = sdnn();
+  ControllerConfig config = sdnn_config();
   core::State state = core::state_of(Controller(config));
   std::get<SDNNCConfig>(config.approximator).n_hidden_units = 1000000;
   EXPECT_NE(error_of(config, state).find("agent.action_value.weights"), std::string::npos);
-  config = sdnn();
+  config = sdnn_config();
   std::get<SDNNCConfig>(config.approximator).n_interpolated = 2000000000;
   EXPECT_NE(error_of(config, state).find("n_interpolated"), std::string::npos);
   config = fuzzy_config();
@@ -315,7 +326,7 @@ TEST(Controller, RefusesStatesOfWrongSizeBeforeItAllocatesMemory) {
 }
 
 TEST(Controller, KeepsCustomPatternsForOneDimensionOfActionsOnly) {
-  ControllerConfig config = sdnn();
+  ControllerConfig config = sdnn_config();
   constexpr int kBins = 4, kPatternUnits = 16;
   std::vector<std::int8_t> signs;
   for (int k = 0; k < kBins * kPatternUnits; ++k) signs.push_back(k % 3 == 0 ? 1 : -1);
@@ -323,7 +334,7 @@ TEST(Controller, KeepsCustomPatternsForOneDimensionOfActionsOnly) {
       3, coding::PatternTable::from_signs(signs, kBins, kPatternUnits));
   const Controller controller(config, tables);
   const core::State state = core::state_of(controller);
-  EXPECT_TRUE(state.contains("table.2"));
+  EXPECT_TRUE(state.contains("table.2"));  // the third table of patterns
   EXPECT_EQ(core::state_of(Controller::restored(config, state)), state);
   config.action = {.low = {0.0, 0.0}, .high = {1.0, 1.0}};  // a network for each dimension
   EXPECT_THROW(Controller(config, tables), std::invalid_argument);

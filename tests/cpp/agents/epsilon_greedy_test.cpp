@@ -2,21 +2,27 @@
 
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
-#include <limits>
 #include <span>
 #include <vector>
 
 #include "sdnn/core/random.hpp"
+#include "states.hpp"
 
 namespace sdnn::agents {
 namespace {
 
 using Row = std::vector<double>;
 
+/// How often the first step takes each action, in `n` selections.
+std::vector<int> counts_of(EpsilonGreedy policy, const Row& values, int n) {
+  std::vector<int> counts(values.size());
+  for (int i = 0; i < n; ++i) ++counts[policy.select(values, 0, /*explore=*/true)];
+  return counts;
+}
+
 std::size_t best_by(TieRule rule, const Row& values) {
-  return EpsilonGreedy({.tie_rule = rule}, 1).select(values, 0, true);
+  return EpsilonGreedy({.tie_rule = rule}, 1).select(values, 0, /*explore=*/true);
 }
 
 TEST(BestValue, IsTheLargestAtAnyIndex) {
@@ -32,7 +38,7 @@ TEST(BestValue, IsTheLargestAtAnyIndex) {
 }
 
 TEST(BestValue, MayBeInfinite) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  using testing::kInfinity;
   EXPECT_EQ(best_value(std::span<const double>(Row{0.0, kInfinity, -kInfinity})), kInfinity);
   EXPECT_EQ(best_value(std::span<const double>(Row(9, -kInfinity))), -kInfinity);
 }
@@ -60,30 +66,27 @@ TEST(EpsilonGreedy, MiddleTakesTheMiddleOfTheFirstLongestRunOfTies) {
 TEST(EpsilonGreedy, ValuesWithinTheToleranceOfTheBestAreTies) {
   const Row values = {0.0, 0.75, 0.75, 0.5, 0.0, 1.0, 0.0};
   const auto selected = [&](TieRule rule, double tolerance) {
-    return EpsilonGreedy({.tie_rule = rule, .tie_tolerance = tolerance}, 1).select(values, 0, true);
+    return EpsilonGreedy({.tie_rule = rule, .tie_tolerance = tolerance}, 1)
+        .select(values, 0, /*explore=*/true);
   };
   EXPECT_EQ(selected(TieRule::middle, 0.0), 5U);   // the best one alone
   EXPECT_EQ(selected(TieRule::middle, 0.25), 1U);  // the longest run of ties: 1 and 2
   EXPECT_EQ(selected(TieRule::middle, 0.5), 2U);   // 1, 2 and 3
   EXPECT_EQ(selected(TieRule::lowest, 0.5), 1U);
-  EpsilonGreedy uniform({.tie_tolerance = 0.25}, 1);
-  std::array<int, 7> counts{};
   const int n = 3000;
-  for (int i = 0; i < n; ++i) ++counts[uniform.select(values, 0, true)];
+  const auto counts = counts_of(EpsilonGreedy({.tie_tolerance = 0.25}, 1), values, n);
   EXPECT_EQ(counts[1] + counts[2] + counts[5], n);
   const double sigma = std::sqrt(n / 3.0 * 2.0 / 3.0);
   for (const std::size_t action : {1U, 2U, 5U}) EXPECT_NEAR(counts[action], n / 3, 5 * sigma);
-  for (const double bad : {-0.1, std::nan(""), std::numeric_limits<double>::infinity()}) {
+  for (const double bad : {-0.1, std::nan(""), testing::kInfinity}) {
     EXPECT_THROW(EpsilonGreedy({.tie_tolerance = bad}, 1), std::invalid_argument);
   }
 }
 
 TEST(EpsilonGreedy, UniformTakesEveryTiedActionEquallyOften) {
-  EpsilonGreedy policy({.tie_rule = TieRule::uniform}, 5);
-  const Row values = {1, 0, 1, 1, 0, 1};
-  std::array<int, 6> counts{};
   const int n = 40000;
-  for (int i = 0; i < n; ++i) ++counts[policy.select(values, 0, true)];
+  const auto counts =
+      counts_of(EpsilonGreedy({.tie_rule = TieRule::uniform}, 5), {1, 0, 1, 1, 0, 1}, n);
   EXPECT_EQ(counts[1] + counts[4], 0);
   const double sigma = std::sqrt(n * 0.25 * 0.75);
   for (const std::size_t action : {0U, 2U, 3U, 5U})
@@ -114,8 +117,8 @@ TEST(EpsilonGreedy, FirstStepsAreGreedyAndLaterOnesRandomWithProbabilityEpsilon)
   int others_early = 0, others_late = 0;
   const int n = 20000;
   for (int i = 0; i < n; ++i) {
-    others_early += policy.select(values, i % 10, true) != 7;
-    others_late += policy.select(values, 10 + i % 40, true) != 7;
+    others_early += policy.select(values, i % 10, /*explore=*/true) != 7;
+    others_late += policy.select(values, 10 + i % 40, /*explore=*/true) != 7;
   }
   EXPECT_EQ(others_early, 0);
   const double p = 0.1 * 49 / 50;  // one of 50 random actions is the best one
@@ -123,25 +126,23 @@ TEST(EpsilonGreedy, FirstStepsAreGreedyAndLaterOnesRandomWithProbabilityEpsilon)
 }
 
 TEST(EpsilonGreedy, RandomActionsAreUniformOverAllActions) {
-  EpsilonGreedy policy({.epsilon = 1.0, .n_greedy_steps = 0}, 3);
-  const Row values = {5, 0, 0, 0, 0};
-  std::array<int, 5> counts{};
+  const EpsilonGreedy policy({.epsilon = 1.0, .n_greedy_steps = 0}, 3);
   const int n = 40000;
-  for (int i = 0; i < n; ++i) ++counts[policy.select(values, 0, true)];
-  for (const int count : counts) EXPECT_NEAR(count, 0.2 * n, 5 * std::sqrt(n * 0.2 * 0.8));
+  for (const int count : counts_of(policy, {5, 0, 0, 0, 0}, n))
+    EXPECT_NEAR(count, 0.2 * n, 5 * std::sqrt(n * 0.2 * 0.8));
 }
 
 TEST(EpsilonGreedy, WithoutExplorationEveryStepIsGreedy) {
   EpsilonGreedy policy({.epsilon = 1.0, .n_greedy_steps = 0}, 4);
-  for (int step = 0; step < 100; ++step) EXPECT_EQ(policy.select(Row{0, 1, 0}, step, false), 1U);
+  for (int step = 0; step < 100; ++step)
+    EXPECT_EQ(policy.select(Row{0, 1, 0}, step, /*explore=*/false), 1U);
 }
 
 TEST(EpsilonGreedy, EvaluationDoesNotChangeTheActionsOfLearning) {
-  EpsilonGreedy alone({.n_greedy_steps = 5}, 8);
-  EpsilonGreedy evaluated({.n_greedy_steps = 5}, 8);
+  EpsilonGreedy alone({.n_greedy_steps = 5}, 8), evaluated = alone;
   const Row tied(30, 0.0);
   for (int i = 0; i < 500; ++i) {
-    for (int j = 0; j < i % 4; ++j) (void)evaluated.select(tied, i % 20, false);
+    for (int j = 0; j < i % 4; ++j) (void)evaluated.select(tied, i % 20, /*explore=*/false);
     EXPECT_EQ(alone.select(tied, i % 20, true), evaluated.select(tied, i % 20, true)) << i;
   }
 }
@@ -151,21 +152,21 @@ TEST(EpsilonGreedy, EqualSeedsGiveEqualActionsAndOtherSeedsDifferentOnes) {
   const Row tied(601, 0.0);
   int differ = 0;
   for (int i = 0; i < 100; ++i) {
-    const std::size_t action = first.select(tied, i, true);
-    EXPECT_EQ(action, same.select(tied, i, true));
-    differ += action != other_seed.select(tied, i, true);
+    const std::size_t action = first.select(tied, i, /*explore=*/true);
+    EXPECT_EQ(action, same.select(tied, i, /*explore=*/true));
+    differ += action != other_seed.select(tied, i, /*explore=*/true);
   }
   EXPECT_GT(differ, 90);  // two of 601 random actions are rarely equal
 }
 
-// Eigen's maximum of a row with NaN is NaN or a number: the row is refused, or the number selected.
+// The maximum of values with NaN may be NaN or a number: values are refused or the number selected.
 TEST(EpsilonGreedy, AnActionWithNaNIsNeverTaken) {
   for (const TieRule rule : {TieRule::uniform, TieRule::lowest, TieRule::middle}) {
     EXPECT_THROW(best_by(rule, {}), std::invalid_argument);
     EXPECT_THROW(best_by(rule, Row(2, std::nan(""))), std::invalid_argument);
     for (std::size_t at = 0; at < 20; ++at) {
       Row values(20, 1.0);
-      values[at] = std::numeric_limits<double>::quiet_NaN();
+      values[at] = testing::kNaN;
       try {
         EXPECT_NE(best_by(rule, values), at);
       } catch (const std::invalid_argument& error) {

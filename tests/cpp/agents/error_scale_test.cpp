@@ -21,12 +21,12 @@ TEST(SquareRoot, IsRoundedDownToAnInteger) {
   }
 }
 
+// normalized(error, exponent) takes errors in units of 2^exponent, of the standard deviation 2^-2.
 TEST(ErrorScale, NormalizesErrorsToARootMeanSquareOfOne) {
   core::Random random(1, core::Stream::weights);
   ErrorScale scale;
   double sum = 0.0;
   for (int i = 0; i < 4000; ++i) {
-    // Errors of standard deviation 2^28, in units of 2^-30.
     const double error = 0x1p28 * random.normal();
     const double normalized = scale.normalized(std::llround(error), -30) / kOne;
     EXPECT_LE(std::abs(normalized), 3.0);  // larger ones are clipped
@@ -43,7 +43,7 @@ TEST(ErrorScale, NormalizesTheFirstErrorToPlusOrMinusOne) {
 }
 
 TEST(ErrorScale, DoesNotDependOnTheUnit) {
-  ErrorScale scale, coarser_scale;  // whose unit doubles every ten errors
+  ErrorScale scale, coarser_scale;  // the unit of the second doubles every ten errors
   const int rounding = 3;           // in units of 1 / 4096
   for (int i = 0; i < 50; ++i) {
     const std::int64_t error = (std::int64_t{i} - 20) << 24;

@@ -14,7 +14,7 @@ namespace sdnn::agents {
 namespace {
 
 /// A clock that the test moves, and that sleeps `oversleep` too long.
-struct HandClock {
+struct ManualClock {
   double now = 100.0, oversleep = 0.0;
 
   FixedRate rate(double hz) {
@@ -22,22 +22,23 @@ struct HandClock {
   }
 };
 
-// 4 Hz: every number is exact.
+// At 4 Hz all times are exact: tick n is due at 100 + n / 4 seconds.
 TEST(FixedRate, TicksDoNotDrift) {
-  HandClock clock;
+  ManualClock clock;
   FixedRate rate = clock.rate(4.0);
   for (std::int64_t tick = 0; tick < 1000; ++tick) {
     EXPECT_EQ(rate.wait(), tick);
     EXPECT_EQ(clock.now, 100.0 + 0.25 * static_cast<double>(tick));
-    clock.now += tick % 2 == 0 ? 0.125 : 0.25;  // just in time is no miss
+    clock.now += tick % 2 == 0 ? 0.125 : 0.25;  // work that ends just in time is no miss
   }
   EXPECT_EQ(rate.n_misses(), 0);
   EXPECT_EQ(rate.n_skipped(), 0);
   EXPECT_EQ(rate.worst_lateness(), 0.0);
 }
 
+// A tick of 4 Hz is missed if the work before it takes longer than 0.25 s.
 TEST(FixedRate, SkipsMissedTicksAndCountsThem) {
-  HandClock clock;
+  ManualClock clock;
   FixedRate rate = clock.rate(4.0);
   EXPECT_EQ(rate.wait(), 0);
   clock.now += 0.875;  // ticks 1, 2 and 3 were at 0.25, 0.5 and 0.75
@@ -57,7 +58,7 @@ TEST(FixedRate, SkipsMissedTicksAndCountsThem) {
 }
 
 TEST(FixedRate, SleepingLongerThanAPeriodIsAMiss) {
-  HandClock clock;
+  ManualClock clock;
   FixedRate rate = clock.rate(4.0);
   rate.wait();
   clock.oversleep = 0.125;  // within the period
@@ -79,31 +80,31 @@ TEST(FixedRate, SleepingLongerThanAPeriodIsAMiss) {
   EXPECT_EQ(once_late.worst_lateness(), 0.625 - 0.5);  // after the end of the period of tick 1
 }
 
-// At any rate, however long the work takes: a tick begins in its own period, and none begins twice.
+// At random rates and with work of random length, a tick begins in its own period, and only once.
 TEST(FixedRate, EveryTickBeginsWithinItsPeriod) {
   core::Random random(2, core::Stream::weights);
   for (int run = 0; run < 200; ++run) {
-    HandClock clock;
+    ManualClock clock;
     clock.now = 1e6 * random.uniform();
     const double start = clock.now;
     const double hz = std::exp(14.0 * random.uniform() - 2.0);  // from 0.14 Hz to 160 kHz
     clock.oversleep = 0.3 * random.uniform() / hz;
     FixedRate rate = clock.rate(hz);
-    std::int64_t last = -1, n_late = 0, n_ticks = 0;
+    std::int64_t last_tick = -1, n_late = 0, n_ticks = 0;
     double deadline = start + 1.0;
     for (int i = 0; i < 100; ++i) {
       if (i > 0) n_late += clock.now > deadline;
       const std::int64_t tick = rate.wait();
       ++n_ticks;
-      ASSERT_GT(tick, last);
+      ASSERT_GT(tick, last_tick);
       ASSERT_GE(clock.now, start + static_cast<double>(tick) / hz);
       ASSERT_LE(clock.now, start + static_cast<double>(tick + 1) / hz);
       deadline = start + static_cast<double>(tick + 1) / hz;
       clock.now += 2.0 * random.uniform() * random.uniform() / hz;
-      last = tick;
+      last_tick = tick;
     }
     EXPECT_EQ(rate.n_misses(), n_late);
-    EXPECT_EQ(last + 1, n_ticks + rate.n_skipped());
+    EXPECT_EQ(last_tick + 1, n_ticks + rate.n_skipped());
     EXPECT_LE(rate.worst_lateness(), 2.0 / hz);
   }
 }

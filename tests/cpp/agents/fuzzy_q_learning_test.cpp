@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "agents/lives.hpp"
 #include "agents/one_dimension.hpp"
+#include "agents/random_task.hpp"
 #include "allocation_count.hpp"
 #include "errors.hpp"
 #include "sdnn/core/random.hpp"
@@ -24,12 +24,13 @@ using State = Numbers;
 
 constexpr EpsilonGreedyConfig kGreedy{.epsilon = 0.0, .tie_rule = TieRule::lowest};
 
-std::vector<float> table(const Fuzzy& agent) {
+std::vector<float> values_of_rules(const Fuzzy& agent) {
   const auto values = agent.rules().table();
   return {values.data(), values.data() + values.size()};
 }
 
-// With one input, sets at 0, 1/2, 1; actions -1, 0, 1. At 0.125 rules 0 and 1 are true 3/4 and 1/4.
+// With one input, sets at 0, 1/2, 1; actions -1, 0, 1. At 0.125 rules 0 and 1 have the truth values
+// 3/4 and 1/4. alpha = 0.5 and gamma = 0.9; V is the mean of the best values by truth.
 TEST(FuzzyQLearning, AStepMovesValuesOfFiredRulesAsWorkedByHand) {
   FuzzyRules rules({.n_inputs = 1, .n_sets = 3, .n_actions = 3});
   rules.set_value(0, 2, 4.0F);  // rule 0 picks +1
@@ -76,7 +77,8 @@ TEST(FuzzyQLearning, RulesExploreIndependentlyAfterTheGreedyFirstSteps) {
   EXPECT_NEAR(random_picks, n * p, 5 * std::sqrt(n * p * (1 - p)));
 }
 
-// Traces by hand: one input at centres, so truth values are 1. gamma lambda = 0.45.
+// An input at the centre of a set fires one rule, with the truth value 1. alpha = 0.5, gamma lambda
+// = 0.9 * 0.5; e are the traces of rules 0 and 1.
 TEST(FuzzyQLearning, TracesDecayByDiscountTimesLambdaAsWorkedByHand) {
   Fuzzy agent(FuzzyRules({.n_inputs = 1, .n_sets = 3, .n_actions = 1}),
               {.trace_decay = 0.5, .policy = kGreedy}, 1);
@@ -84,33 +86,33 @@ TEST(FuzzyQLearning, TracesDecayByDiscountTimesLambdaAsWorkedByHand) {
                                       bool terminated = false) {
     agent.learn(State{s}, agent.act(State{s}), reward, State{next}, terminated);
   };
-  const auto v = [&agent](std::size_t rule) { return agent.rules().values(rule)[0]; };
+  const auto value_of_rule = [&agent](std::size_t rule) { return agent.rules().values(rule)[0]; };
   act_and_learn(0.0, 0.0, 0.5);
-  EXPECT_EQ(v(0), 0.0F);
+  EXPECT_EQ(value_of_rule(0), 0.0F);
   act_and_learn(0.5, 2.0, 1.0);  // step = 0.5 2; e = 0.45, 1
-  EXPECT_EQ(v(0), 0.45F);
-  EXPECT_EQ(v(1), 1.0F);
+  EXPECT_EQ(value_of_rule(0), 0.45F);
+  EXPECT_EQ(value_of_rule(1), 1.0F);
   act_and_learn(0.0, 1.0, 1.0);  // step = 0.5 (1 - 0.45F); e = 0.45^2 + 1, 0.45
   const double step = 0.5 * (1.0 - static_cast<double>(0.45F));
-  EXPECT_FLOAT_EQ(v(0), static_cast<float>(0.45 + step * 1.2025));
-  EXPECT_FLOAT_EQ(v(1), static_cast<float>(1.0 + step * 0.45));
+  EXPECT_FLOAT_EQ(value_of_rule(0), static_cast<float>(0.45 + step * 1.2025));
+  EXPECT_FLOAT_EQ(value_of_rule(1), static_cast<float>(1.0 + step * 0.45));
   act_and_learn(1.0, 4.0, 1.0, true);  // step = 0.5 * 4; the traces end with the episode
-  const float v1 = v(1);
-  EXPECT_EQ(v(2), 2.0F);
+  const float v1 = value_of_rule(1);
+  EXPECT_EQ(value_of_rule(2), 2.0F);
   act_and_learn(1.0, 4.0, 1.0, true);
-  EXPECT_EQ(v(1), v1);
+  EXPECT_EQ(value_of_rule(1), v1);
 }
 
 TEST(FuzzyQLearning, AStepAllocatesNothingWithAndWithoutTraces) {
-  for (const double trace_decay : {0.0, 1.0}) {
+  for (const double trace_decay : {0.0, 1.0}) {  // 0: without traces
     Fuzzy agent(FuzzyRules({.n_inputs = 4}), {.trace_decay = trace_decay}, 1);
-    core::Random world(3, core::Stream::ties);
+    core::Random random(3, core::Stream::ties);
     State state(4), next(4);
     const std::size_t before = testing::allocation_count();
     for (int i = 0; i < 1000; ++i) {
-      for (double& x : next) x = world.uniform();
+      for (double& x : next) x = random.uniform();
       const double action = agent.act(state);
-      agent.learn(state, action, 1e-3 * world.uniform(), next, false);
+      agent.learn(state, action, 1e-3 * random.uniform(), next, false);
       state.swap(next);
     }
     EXPECT_EQ(testing::allocation_count(), before);
@@ -147,18 +149,18 @@ TEST(FuzzyQLearning, RefusesBadTransitionsAndLearnsNothing) {
   EXPECT_EQ(learn(state, action, 1.0, bad), "state[1] must be in [0, 1], got 1.7");
   EXPECT_THROW(agent.learn(state, action, 1e300, other, false), std::overflow_error);
   EXPECT_THROW((void)agent.act(bad), std::invalid_argument);
-  for (const float value : table(agent)) EXPECT_EQ(value, 0.0F);
+  for (const float value : values_of_rules(agent)) EXPECT_EQ(value, 0.0F);
   EXPECT_EQ(learn(state, action, 1.0, other), "no error");
 }
 
-Fuzzy traced_agent() {
+Fuzzy agent_with_traces() {
   return {FuzzyRules({.n_inputs = 2, .n_sets = 4, .n_actions = 5}),
           {.trace_decay = 0.8, .policy = {.epsilon = 0.3, .n_greedy_steps = 2}},
           3};
 }
 
 TEST(FuzzyQLearning, ARefusedRewardDoesNotChangeTraces) {
-  Fuzzy agent = traced_agent(), without_refusals = traced_agent();
+  Fuzzy agent = agent_with_traces(), without_refusals = agent_with_traces();
   const State state = {0.3, 0.6}, next = {0.3, 0.7};
   for (int step = 0; step < 20; ++step) {
     const double action = agent.act(state);
@@ -167,47 +169,47 @@ TEST(FuzzyQLearning, ARefusedRewardDoesNotChangeTraces) {
     agent.learn(state, action, 1.0, next, false);
     without_refusals.learn(state, action, 1.0, next, false);
   }
-  EXPECT_EQ(table(agent), table(without_refusals));
+  EXPECT_EQ(values_of_rules(agent), values_of_rules(without_refusals));
 }
 
 // Two environments in which different rules fire learn as if each were alone.
 TEST(FuzzyQLearning, EnvironmentsHaveSeparateLastActionsAndTraces) {
   const FuzzyQLearningConfig config{.trace_decay = 0.5, .policy = kGreedy};
   const FuzzyRules rules({.n_inputs = 2, .n_sets = 4, .n_actions = 3});
-  Fuzzy both(rules, config, 1), low(rules, config, 1), high(rules, config, 1);
+  Fuzzy both(rules, config, 1);
+  std::vector<Fuzzy> alone(2, both);
   both.set_n_environments(2);
   EXPECT_EQ(both.n_environments(), 2U);
-  core::Random world(4, core::Stream::weights);
-  State low_state = {0.1, 0.1}, high_state = {0.9, 0.9};
+  core::Random random(4, core::Stream::weights);
+  std::vector<State> states = {{0.1, 0.1}, {0.9, 0.9}};
+  const int n_steps[] = {20, 33};  // of an episode
   for (int i = 0; i < 300; ++i) {
-    if (i % 20 == 0) {
-      both.begin_episode(0);
-      low.begin_episode();
+    Numbers actions;
+    for (const std::size_t e : {0U, 1U}) {
+      if (i % n_steps[e] == 0) {
+        both.begin_episode(e);
+        alone[e].begin_episode();
+      }
+      actions.push_back(both.act(states[e], true, e));
+      ASSERT_EQ(actions[e], alone[e].act(states[e]));
+      ASSERT_EQ(both.last_action(e), alone[e].last_action());
     }
-    if (i % 33 == 0) {
-      both.begin_episode(1);
-      high.begin_episode();
+    for (const std::size_t e : {0U, 1U}) {
+      State next = {random.uniform() / 3.0, random.uniform() / 3.0};
+      if (e == 1) next = {1.0 - next[0], 1.0 - next[1]};
+      const double reward = random.uniform();
+      const bool terminated = i % n_steps[e] == n_steps[e] - 1;
+      both.learn(states[e], actions[e], reward, next, terminated, e);
+      alone[e].learn(states[e], actions[e], reward, next, terminated);
+      states[e] = next;
     }
-    const State next_low = {world.uniform() / 3.0, world.uniform() / 3.0};
-    const State next_high = {1.0 - world.uniform() / 3.0, 1.0 - world.uniform() / 3.0};
-    const double low_action = both.act(low_state), high_action = both.act(high_state, true, 1);
-    ASSERT_EQ(low_action, low.act(low_state));
-    ASSERT_EQ(high_action, high.act(high_state));
-    ASSERT_EQ(both.last_action(1), high.last_action());
-    const double low_reward = world.uniform(), high_reward = -world.uniform();
-    both.learn(low_state, low_action, low_reward, next_low, i % 20 == 19);
-    both.learn(high_state, high_action, high_reward, next_high, i % 33 == 32, 1);
-    low.learn(low_state, low_action, low_reward, next_low, i % 20 == 19);
-    high.learn(high_state, high_action, high_reward, next_high, i % 33 == 32);
-    low_state = next_low;
-    high_state = next_high;
   }
   for (const double x : {0.05, 0.2, 0.3}) {
-    EXPECT_EQ(testing::value_of(both, State{x, x / 2.0}),
-              testing::value_of(low, State{x, x / 2.0}));
-    EXPECT_EQ(testing::value_of(both, State{1.0 - x, 0.8}),
-              testing::value_of(high, State{1.0 - x, 0.8}));
+    const State low = {x, x / 2.0}, high = {1.0 - x, 0.8};
+    EXPECT_EQ(testing::value_of(both, low), testing::value_of(alone[0], low));
+    EXPECT_EQ(testing::value_of(both, high), testing::value_of(alone[1], high));
   }
+  const State& low_state = states[0];
   EXPECT_THROW(both.learn(low_state, both.act(low_state), 1.0, low_state, false, 1),
                std::invalid_argument);
   EXPECT_THROW((void)both.act(low_state, true, 2), std::invalid_argument);
@@ -217,11 +219,13 @@ TEST(FuzzyQLearning, EnvironmentsHaveSeparateLastActionsAndTraces) {
 }
 
 TEST(FuzzyQLearning, ARestoredAgentAllocatesNothing) {
-  testing::expect_that_a_restored_agent_allocates_nothing(traced_agent, testing::allocation_count);
+  testing::expect_that_a_restored_agent_allocates_nothing(agent_with_traces,
+                                                          testing::allocation_count);
 }
 
+// An agent learns only the action of its last act, which a state from before it does not have.
 TEST(FuzzyQLearning, ARestoredStateWithoutAnActionForgetsTheLastOne) {
-  Fuzzy agent = traced_agent();
+  Fuzzy agent = agent_with_traces();
   const core::State fresh = core::state_of(agent);
   const State state = {0.3, 0.6};
   const double action = agent.act(state);
@@ -232,7 +236,7 @@ TEST(FuzzyQLearning, ARestoredStateWithoutAnActionForgetsTheLastOne) {
 
 // The agent has 4^2 rules, of which 2^2 fire in a step, and 5 actions.
 TEST(FuzzyQLearning, RefusesInconsistentStates) {
-  Fuzzy agent = traced_agent();
+  Fuzzy agent = agent_with_traces();
   agent.begin_episode();
   for (const State& state : {State{0.3, 0.6}, State{0.9, 0.1}}) {
     const double action = agent.act(state);
@@ -241,7 +245,7 @@ TEST(FuzzyQLearning, RefusesInconsistentStates) {
   (void)agent.act(State{0.2, 0.3});
   testing::expect_damaged_states_refused(agent);
   const core::State good = core::state_of(agent);
-  ASSERT_EQ(good.at("eligibilities").size(), 2U * 4);  // two steps
+  ASSERT_EQ(good.at("eligibilities").size(), 2U * 4);  // 4 rules in each of two steps
   using testing::with_number;
   const auto refused = [&](const core::State& bad, const std::string& message) {
     testing::expect_refused(agent, bad, "state: " + message);
@@ -268,15 +272,15 @@ FuzzyRules small_rules() { return FuzzyRules({.n_inputs = 2, .n_sets = 4, .n_act
 constexpr FuzzyQLearningConfig kTraced{.trace_decay = 0.7,
                                        .policy = {.epsilon = 0.3, .n_greedy_steps = 0}};
 
-Fuzzy agent_of_one(std::uint64_t seed) { return {small_rules(), kTraced, seed}; }
+Fuzzy agent_of_one_dimension(std::uint64_t seed) { return {small_rules(), kTraced, seed}; }
 
-FuzzyQLearning agent_of_two() {
+FuzzyQLearning agent_of_two_action_dimensions() {
   return {std::vector<FuzzyRules>{small_rules(), small_rules()}, kTraced, 1};
 }
 
 TEST(FuzzyQLearning, DimensionsOfAnActionLearnLikeSeparateAgents) {
-  FuzzyQLearning both = agent_of_two();
-  Fuzzy first = agent_of_one(1), second = agent_of_one(seed_of_dimension(1, 1));
+  FuzzyQLearning both = agent_of_two_action_dimensions();
+  Fuzzy first = agent_of_one_dimension(1), second = agent_of_one_dimension(seed_of_dimension(1, 1));
   EXPECT_EQ(both.n_dimensions(), 2U);
   EXPECT_EQ(both.n_inputs(), 2U);
   Numbers state = {0.2, 0.9};

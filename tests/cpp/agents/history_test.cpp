@@ -60,7 +60,8 @@ Mass pushed_mass(std::size_t n, double noise, std::uint64_t seed) {
   return mass;
 }
 
-TEST(LeastSquares, FindsTheWeightsOfALine) {
+// Two targets depend on the features 1, a and b; weights are feature by feature.
+TEST(LeastSquares, FindsTheWeightsOfLinearTargets) {
   Numbers features, targets;
   for (int t = 0; t < 20; ++t) {
     const double a = 0.1 * t, b = t % 3;
@@ -212,7 +213,7 @@ TEST(History, ContinuesExactlyAfterItWasSavedAtAnyStep) {
   }
 }
 
-// Any array of the history without its last element is refused, and so are twice as many levels.
+// An array of the history without its last element is refused, and so is `n_levels` doubled.
 TEST(History, RefusesInconsistentStates) {
   const ControllerConfig config = config_of(History::observer);
   Controller controller(config);
@@ -236,6 +237,7 @@ TEST(History, RefusesInconsistentStates) {
   EXPECT_THROW((void)Controller::restored(config, more), std::invalid_argument);
 }
 
+// The learner receives the observations, actions and rewards of the actor.
 TEST(History, LearningWithoutActingGivesTheSameWeights) {
   Controller actor(config_of(History::differences)), learner(config_of(History::differences));
   core::Random random(5, core::Stream::weights);
@@ -316,8 +318,7 @@ TEST(History, ASingleInputIsNotRepeatedBesideInputsOfAHistory) {
   }
 }
 
-/// An agent with a grid of rules: 8^2 without a history, 8^4 with differences.
-ControllerConfig grid(History history) {
+ControllerConfig grid_config(History history) {
   ControllerConfig config = config_of(history);
   config.approximator =
       approximators::FuzzyRulesConfig{.n_sets = 8, .n_actions = 3, .max_table_bytes = 1 << 14};
@@ -326,9 +327,10 @@ ControllerConfig grid(History history) {
   return config;
 }
 
-TEST(History, AGridThatIsTooLargeWithDifferencesIsRefusedOrHasNone) {
-  EXPECT_THROW(Controller(grid(History::differences)), std::length_error);
-  ControllerConfig config = grid(History::automatic);
+// A grid of 8^2 fuzzy rules fits into its memory limit, one of 8^4 with differences does not.
+TEST(History, DifferencesThatMakeAGridTooLargeAreRefusedAndNotSelectedAutomatically) {
+  EXPECT_THROW(Controller(grid_config(History::differences)), std::length_error);
+  ControllerConfig config = grid_config(History::automatic);
   config.observation.adaptive = true;  // has a warm-up
   Controller controller(config);
   core::Random random(5, core::Stream::weights);

@@ -65,12 +65,13 @@ TEST(Imitation, MovesAllValuesToTheReturnAndTheBestTwoApart) {
   EXPECT_EQ(agent.n_learned(), 1);
 }
 
+// SARSA learns a transition when the next action is known, so it keeps the last one pending.
 TEST(Imitation, LearnsThePendingTransition) {
   const QLambdaConfig sarsa{.discount = 0.5,
                             .trace_decay = 0.0,
                             .bootstrap = Bootstrap::sarsa,
                             .final_learning_rate = {}};
-  QLambda agent = q_lambda_of({3}, 1, sarsa);
+  QLambda agent = q_lambda_of(/*n_actions=*/{3}, /*window=*/1, sarsa);
   agent.learn(kState, Indices{0}, 4.0, State{0.9, 0.9}, false);
   EXPECT_EQ(values(agent, kState)[0], 0.0);  // pending
   agent.imitate(State{0.9, 0.2}, Indices{1}, 0.0, 1e-3);
@@ -113,7 +114,7 @@ TEST(Imitation, GivesTheSameBitsOnEveryInstructionSetAndAfterASave) {
     });
     for (const core::State& state : states) EXPECT_EQ(state, states.front());
   };
-  expect_equal([] { return q_lambda_of({3, 5}, 2); });
+  expect_equal([] { return q_lambda_of(/*n_actions=*/{3, 5}, /*window=*/2); });
   expect_equal([] { return imitating_actor_critic({3, 5}); });
 }
 

@@ -31,6 +31,7 @@ void expect_oldest(NStepBuffer& steps, int i) {
   EXPECT_EQ(oldest.reward, static_cast<double>(1 << i));
 }
 
+// add and expect_oldest take the number of a step.
 TEST(NStepBuffer, ReturnsTheOldestStepFirst) {
   NStepBuffer steps = buffer_of(3);
   EXPECT_EQ(steps.size(), 0U);
@@ -47,7 +48,8 @@ TEST(NStepBuffer, ReturnsTheOldestStepFirst) {
   EXPECT_EQ(steps.size(), 0U);
 }
 
-// Rewards 1, 2, 4, then 8, 16; gamma = 1/2: every number is exact.
+// Step i has the reward 2^i; the value of the state after the last step is the first argument of
+// return_of_oldest, gamma = 1/2 the second one.
 TEST(NStepBuffer, TheReturnOfTheOldestStepDiscountsLaterRewards) {
   NStepBuffer steps = buffer_of(3);
   EXPECT_EQ(steps.return_of_oldest(5.0, 0.5), 5.0);  // the value of the next state alone
@@ -63,15 +65,16 @@ TEST(NStepBuffer, TheReturnOfTheOldestStepDiscountsLaterRewards) {
   EXPECT_EQ(steps.return_of_oldest(-8.0, 0.5), 8.0 + 16.0 / 2 - 8.0 / 4);
 }
 
-// Durations 2, 1/2 and 1 with gamma = 1/4: discounts 1/16, 1/2 and 1/4.
+// Durations 2, 1/2 and 1 with gamma = 1/4: discounts 1/16, 1/2 and 1/4. Rewards are 16; the last
+// state's value of 64 is discounted to 16.
 TEST(NStepBuffer, DiscountsBySquaresAndRootsForLongerAndShorterSteps) {
-  NStepBuffer steps(3, 1, 2);
+  NStepBuffer steps = buffer_of(3);
   const Numbers dts{2.0, 0.5, 1.0};
   for (std::size_t i = 0; i < 3; ++i) {
     steps.add(Numbers{0.5}, Indices{0, 0}, 16.0, Numbers{0.5}, dts[i]);
   }
   EXPECT_DOUBLE_EQ(steps.return_of_oldest(64.0, 0.25), 16.0 + (16.0 + (16.0 + 16.0) / 2.0) / 16.0);
-  NStepBuffer restored(3, 1, 2);
+  NStepBuffer restored = buffer_of(3);
   core::restore(restored, core::state_of(steps));
   EXPECT_EQ(restored.return_of_oldest(64.0, 0.25), steps.return_of_oldest(64.0, 0.25));
   testing::expect_refused(steps, testing::with_number(core::state_of(steps), "dts", 0.0, 1),
@@ -103,6 +106,7 @@ TEST(NStepBuffer, VisitsEachPendingStepOnce) {
   EXPECT_FALSE(steps.each_is([](const NStepBuffer::Step& step) { return step.reward < 4.0; }));
 }
 
+// The buffer holds 2 of at most 3 steps with actions of two dimensions.
 TEST(NStepBuffer, RefusesInconsistentStates) {
   NStepBuffer steps = buffer_of(3);
   for (int i = 0; i < 2; ++i) add(steps, i);

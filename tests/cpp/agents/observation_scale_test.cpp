@@ -43,8 +43,8 @@ TEST(ObservationScale, ScalesNumbersAndAnglesAsWorkedByHand) {
   const ObservationScale scale = scale_of_angles();
   EXPECT_EQ(scale.n_observed(), 4U);
   EXPECT_EQ(scale.n_inputs(), 3U);
-  // Angles of 0, 90, -90 and 180 degrees; speeds are clipped to -8 to 8; 15 is 11, 9 is 13 and 14
-  // is 10 on the circle.
+  // Variables are cosine and sine of an angle (0, 90, -90 and 180 degrees), a speed, clipped to
+  // [-8, 8], and a circular variable from 10 to 14, where 15 is 11, 9 is 13 and 14 is 10.
   EXPECT_EQ(scaled(scale, {1.0, 0.0, 4.0, 11.0}), (Numbers{0.5, 0.75, 0.25}));
   EXPECT_EQ(scaled(scale, {0.0, 1.0, 80.0, 15.0}), (Numbers{0.75, 1.0, 0.25}));
   EXPECT_EQ(scaled(scale, {0.0, -0.5, -9.0, 9.0}), (Numbers{0.25, 0.0, 0.75}));
@@ -53,13 +53,14 @@ TEST(ObservationScale, ScalesNumbersAndAnglesAsWorkedByHand) {
   EXPECT_EQ(scaled(scale, {0.0, 0.0, 1e308, -1e308})[1], 1.0);
 }
 
-// The middles of two bins are 1/4 and 3/4, those of three bins 1/6, 1/2 and 5/6.
+// A symbol of two one-hot variables, a number in [-1, 1] and a symbol of three variables. The
+// middles of two bins are 1/4 and 3/4, those of three bins 1/6, 1/2 and 5/6.
 TEST(ObservationScale, ScalesOneHotSymbolsToTheMiddleOfTheirBin) {
   const ObservationScale scale = scale_of_symbols();
   EXPECT_EQ(scale.n_inputs(), 3U);
   EXPECT_EQ(scaled(scale, {1.0, 0.0, 0.0, 0.0, 0.0, 1.0}), (Numbers{0.25, 0.5, 2.5 / 3.0}));
   EXPECT_EQ(scaled(scale, {0.0, 1.0, 1.0, 0.0, 1.0, 0.0}), (Numbers{0.75, 1.0, 0.5}));
-  EXPECT_EQ(scaled(scale, {0.0, 0.0, 0.0, 0.0, 0.0, 0.0})[2], 0.5 / 3.0);  // the first of equals
+  EXPECT_EQ(scaled(scale, {0.0, 0.0, 0.0, 0.0, 0.0, 0.0})[2], 0.5 / 3.0);  // the first symbol
 }
 
 TEST(ObservationScale, StatesAreInTheUnitIntervalForAnyFiniteObservation) {

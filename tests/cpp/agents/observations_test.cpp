@@ -160,6 +160,8 @@ Numbers wandering(double noise, double radius_moves) {
   return observed;
 }
 
+// wandering(noise, radius_moves) is a path of the cosine and sine of a moving angle, which are one
+// input if they are found to be on a circle, else two.
 TEST(Observations, FindNoisyAnglesButNotPositions) {
   ObservationConfig config = unbounded(2);
   config.find_angle_pairs = true;
@@ -212,26 +214,26 @@ TEST(Observations, AppendInputsThatAreAddedLaterAndRestoreThem) {
 TEST(Observations, RefuseBadConfigurationsByTheirField) {
   const ObservationConfig good{.low = Ends(3, 0.0), .high = Ends(3, 1.0), .symbols = {{1, 2}}};
   EXPECT_EQ(error_of(good), "no error");
-  const auto names = [&good](const char* name, auto change) {
+  const auto expect_error_naming = [&good](const char* name, auto change) {
     ObservationConfig bad = good;
     change(bad);
     EXPECT_NE(error_of(bad).find(name), std::string::npos) << error_of(bad);
   };
-  names("observation.low", [](auto& bad) { bad = {}; });
-  names("observation.high", [](auto& bad) { bad.high.pop_back(); });
-  names("observation.high", [](auto& bad) { bad.high[0] = -1.0; });
-  names("angles", [](auto& bad) { bad.angles = {3}; });
-  names("angles", [](auto& bad) { bad.angles = {-1}; });
-  names("angles", [](auto& bad) { bad.angles = {2}; });  // a variable of the symbol
-  names("angles", [](auto& bad) { bad.angles = {0, 0}; });
-  names("angles", [](auto& bad) {
+  expect_error_naming("observation.low", [](auto& bad) { bad = {}; });
+  expect_error_naming("observation.high", [](auto& bad) { bad.high.pop_back(); });
+  expect_error_naming("observation.high", [](auto& bad) { bad.high[0] = -1.0; });
+  expect_error_naming("angles", [](auto& bad) { bad.angles = {3}; });
+  expect_error_naming("angles", [](auto& bad) { bad.angles = {-1}; });
+  expect_error_naming("angles", [](auto& bad) { bad.angles = {2}; });  // a variable of the symbol
+  expect_error_naming("angles", [](auto& bad) { bad.angles = {0, 0}; });
+  expect_error_naming("angles", [](auto& bad) {
     bad.angles = {0};
     bad.high[0] = std::nullopt;
   });
-  names("angle_pairs", [](auto& bad) { bad.angle_pairs = {{0, 3}}; });
-  names("angle_pairs", [](auto& bad) { bad.angle_pairs = {{0}}; });
-  names("symbols", [](auto& bad) { bad.symbols = {{2, 2}}; });
-  names("symbols", [](auto& bad) { bad.symbols = {{0, 2}, {1, 2}}; });
+  expect_error_naming("angle_pairs", [](auto& bad) { bad.angle_pairs = {{0, 3}}; });
+  expect_error_naming("angle_pairs", [](auto& bad) { bad.angle_pairs = {{0}}; });
+  expect_error_naming("symbols", [](auto& bad) { bad.symbols = {{2, 2}}; });
+  expect_error_naming("symbols", [](auto& bad) { bad.symbols = {{0, 2}, {1, 2}}; });
 }
 
 }  // namespace

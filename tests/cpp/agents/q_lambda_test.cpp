@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "agents/random_task.hpp"
 #include "instruction_sets.hpp"
 #include "sdnn/approximators/linear_sdnn.hpp"
 #include "sdnn/core/random.hpp"
@@ -128,7 +129,7 @@ QLambdaConfig with_tolerance(double tolerance) {
           .final_learning_rate = {}};
 }
 
-// Rewards of 1 and 0.8 tie within 0.25, of 1 and 0.7 do not, whatever a unit of values is.
+// Rewards of 1 and 0.8 tie within 0.25, of 1 and 0.7 do not, at any scale of rewards.
 TEST(QLambda, TheToleranceOfTiesIsInUnitsOfValues) {
   const State a{0.1, 0.1};
   for (const double scale : {1.0, 1e-300, 1e250}) {
@@ -180,6 +181,7 @@ TEST(QLambda, RefusesMasksOfWrongSizeOrValues) {
   EXPECT_TRUE(std::ranges::equal(agent.best_action(state, workspace, ties, only), Indices{2, 0}));
 }
 
+// n_symbols is 0 for an input that is a number.
 TEST(QLambda, EpsilonDecaysToZeroButStaysConstantForSymbolsOnly) {
   const QLambdaConfig config{.policy = {.epsilon = 0.5, .n_greedy_steps = 0},
                              .schedule_steps = 100};
@@ -203,7 +205,7 @@ TEST(QLambda, LearnsTheSameBitsOnEveryInstructionSet) {
   for (const auto traces : {TraceKind::dutch, TraceKind::replacing}) {
     std::vector<std::vector<std::int32_t>> learned;
     testing::on_every_instruction_set([&](auto) {
-      QLambda agent = agent_of({.traces = traces}, {5, 2}, 2);
+      QLambda agent = agent_of({.traces = traces}, /*n_actions=*/{5, 2}, /*window=*/2);
       learn_at_random(agent, 300, 2);
       const auto weights = agent.readout().weights();
       learned.emplace_back(weights.begin(), weights.end());
@@ -221,8 +223,7 @@ int longest_action(QLambda agent, int n_ended) {
   int longest = 0, n = 0;
   for (int i = 0; i < 5000; ++i) {
     if (i % 1000 == 0) agent.begin_episode();  // before excursions begin, after 2,000 steps
-    const auto span = agent.act(state);
-    const Indices action(span.begin(), span.end());
+    const Indices action = testing::copied(agent.act(state));
     n = action == last ? n + 1 : 1;  // of 250^2 actions, two successive ones are hardly ever equal
     last = action;
     longest = std::max(longest, n);
@@ -230,6 +231,7 @@ int longest_action(QLambda agent, int n_ended) {
   return longest;
 }
 
+// longest_action(agent, n) is the number of steps of the longest random action after n ends.
 TEST(QLambda, EveryEndOfAnEpisodeHalvesTheLongestRandomActionDownToFiveSteps) {
   const std::vector<std::size_t> many{250, 250};
   const auto agent = [&](int longest) { return agent_of({.max_action_repeat = longest}, many); };
@@ -244,7 +246,7 @@ TEST(QLambda, EveryEndOfAnEpisodeHalvesTheLongestRandomActionDownToFiveSteps) {
 // In long episodes some explorations are excursions: several steps of actions with the lowest
 // value, so that an agent that would stay in good states learns about others.
 TEST(QLambda, StepsOfExcursionsAreTheWorstOnesAndAreLearnedOnlyIfTheyTerminate) {
-  QLambda agent = agent_of({.max_action_repeat = 20}, {5}, 2);
+  QLambda agent = agent_of({.max_action_repeat = 20}, /*n_actions=*/{5}, /*window=*/2);
   learn_at_random(agent, 100, 2);
   agent.set_epsilon(1.0);
   agent.begin_episode();
@@ -252,8 +254,7 @@ TEST(QLambda, StepsOfExcursionsAreTheWorstOnesAndAreLearnedOnlyIfTheyTerminate) 
   auto workspace = agent.workspace();
   int n_left_out = 0;
   for (int i = 0; i < 4000; ++i) {
-    const auto span = agent.act(state);
-    const Indices action(span.begin(), span.end());
+    const Indices action = testing::copied(agent.act(state));
     const QLambda before = agent;
     agent.learn(state, action, 1.0, state, false);
     if (agent.n_learned() > before.n_learned()) continue;
@@ -290,8 +291,7 @@ TEST(QLambda, SearchesTwiceAsLongAfterTheFirstRewardAsBeforeIt) {
   Indices last;
   int run = 0;
   for (int i = 0; i < 20; ++i) {
-    const auto span = agent.act(state);
-    const Indices action(span.begin(), span.end());
+    const Indices action = testing::copied(agent.act(state));
     run = action == last ? run + 1 : 1;
     last = action;
     EXPECT_LE(run, 5);

@@ -9,6 +9,7 @@
 #include <set>
 #include <vector>
 
+#include "agents/random_task.hpp"
 #include "agents/small_q_learning.hpp"
 #include "sdnn/core/random.hpp"
 #include "states.hpp"
@@ -17,7 +18,7 @@ namespace sdnn::agents::small_q_learning {
 namespace {
 
 TEST(QLearning, CorrectsValuesByEquationOneAsWorkedByHand) {
-  Agent agent(LookupTable(1, 5, 2), {}, 1);  // alpha = 0.5, gamma = 0.9
+  Agent agent(five_cells(), {}, 1);  // alpha = 0.5, gamma = 0.9
   const auto q = [&](int s, std::size_t a) { return agent.network().value(cell(s), a); };
   agent.learn(cell(1), 0, 10.0, cell(2), true);  // 0.5 * 0 + 0.5 * 10
   EXPECT_EQ(q(1, 0), 5.0);
@@ -33,16 +34,17 @@ TEST(QLearning, CorrectsValuesByEquationOneAsWorkedByHand) {
 
 // The next state's value is taken before the correction, also when it is the same state.
 TEST(QLearning, ATransitionToTheSameStateUsesItsOldValue) {
-  LookupTable table(1, 5, 2);
+  LookupTable table = five_cells();
   table.update(cell(3), 0, 4.0);
   Agent agent(table, {}, 1);
   agent.learn(cell(3), 0, 2.0, cell(3), false);
   EXPECT_DOUBLE_EQ(agent.network().value(cell(3), 0), 0.5 * 4.0 + 0.5 * (2.0 + 0.9 * 4.0));
 }
 
-// Rewards 1, 2, 4, then the goal with 8; gamma = 1/2, alpha = 1: every number is exact.
+// Rewards 1, 2, 4, then the goal with 8; the best value in cell 2 is 16. With gamma = 1/2 and
+// alpha = 1 every number is exact.
 TEST(QLearning, NStepReturnsAreLearnedOnceAfterNSteps) {
-  LookupTable table(1, 5, 2);
+  LookupTable table = five_cells();
   table.update(cell(2), 1, 16.0);
   Agent agent(table, {.learning_rate = 1.0, .discount = 0.5, .n_steps = 2}, 1);
   const auto q = [&](int s) { return agent.network().value(cell(s), 0); };
@@ -62,8 +64,9 @@ TEST(QLearning, NStepReturnsAreLearnedOnceAfterNSteps) {
   EXPECT_EQ(agent.network(), learned);
 }
 
+// alpha = 1, gamma = 1/2, returns of five steps; the best value in cell 2 is 16.
 TEST(QLearning, PendingStepsAreLearnedBeforeANewEpisodeAndATransitionFromAnotherState) {
-  LookupTable table(1, 5, 2);
+  LookupTable table = five_cells();
   table.update(cell(2), 1, 16.0);
   for (const bool begins_episode : {true, false}) {
     Agent agent(table, {.learning_rate = 1.0, .discount = 0.5, .n_steps = 5}, 1);
@@ -83,15 +86,15 @@ TEST(QLearning, PendingStepsAreLearnedBeforeANewEpisodeAndATransitionFromAnother
 }
 
 TEST(QLearning, BadTransitionsAreRefusedBeforeTheyArePending) {
-  Agent agent(LookupTable(1, 5, 2), {.n_steps = 3}, 1);
+  Agent agent(five_cells(), {.n_steps = 3}, 1);
   EXPECT_THROW(agent.learn(Position{1.5}, 0, 1.0, cell(1), false), std::invalid_argument);
   EXPECT_THROW(agent.learn(cell(0), 0, 1.0, Position{1.5}, false), std::invalid_argument);
   agent.begin_episode();
-  EXPECT_EQ(agent.network(), LookupTable(1, 5, 2));
+  EXPECT_EQ(agent.network(), five_cells());  // nothing was pending
 }
 
 TEST(QLearning, GreedyFirstStepsAreCountedFromTheBeginningOfAnEpisode) {
-  LookupTable table(1, 5, 3);
+  LookupTable table = five_cells(3);
   table.update(cell(0), 2, 1.0);
   Agent agent(table, {.policy = {.epsilon = 1.0, .n_greedy_steps = 4}}, 3);
   int others = 0;
@@ -130,12 +133,12 @@ TEST(QLearning, RefusesBadTransitionsAndChangesNothing) {
   EXPECT_EQ(core::state_of(agent), before);
 }
 
-// Two successive random draws of 2^17 actions are hardly ever the same.
-TEST(QLearning, ARandomActionLastsKStepsWithProbabilityOneKth) {
+// Two successive draws of 2^17 actions are hardly ever equal, so equal actions are repetitions.
+TEST(QLearning, ARandomActionLastsKOrMoreStepsWithProbabilityOneKth) {
   constexpr int kLongest = 8, kDraws = 20000;
   Agent agent(LookupTable(1, 1, 1 << 17),
               {.policy = {.epsilon = 1.0, .n_greedy_steps = 0}, .max_action_repeat = kLongest}, 4);
-  std::array<int, kLongest + 1> at_least{};
+  std::array<int, kLongest + 1> at_least{};  // actions that lasted k steps or more
   std::size_t last = agent.act(cell(0));
   int lasted = 1;
   for (int n = 0; n < kDraws;) {
@@ -158,8 +161,8 @@ TEST(QLearning, ARandomActionLastsKStepsWithProbabilityOneKth) {
 }
 
 TEST(QLearning, ARepeatedActionEndsWithTheEpisodeAndNotWithEvaluations) {
-  LookupTable table(1, 1, 1 << 17);
-  table.update(cell(0), 5, 1.0);
+  LookupTable table(1, 1, 1 << 17);  // 2^17 actions: only repeated ones are equal
+  table.update(cell(0), 5, 1.0);     // the greedy action
   Agent agent(table, {.policy = {.epsilon = 1.0, .n_greedy_steps = 0}, .max_action_repeat = 1000},
               1);
   int n_kept = 0;
@@ -170,7 +173,7 @@ TEST(QLearning, ARepeatedActionEndsWithTheEpisodeAndNotWithEvaluations) {
     n_kept += agent.act(cell(0)) == action;
     Agent begun = agent;
     begun.begin_episode();
-    EXPECT_NE(begun.act(cell(0)), action);
+    EXPECT_NE(begun.act(cell(0)), action);  // a new random one of 2^17
   }
   // A random action lasts at least two steps with probability 1/2; five standard deviations of 200
   // trials are 5 * sqrt(200 / 4) = 35.4.
@@ -179,7 +182,7 @@ TEST(QLearning, ARepeatedActionEndsWithTheEpisodeAndNotWithEvaluations) {
 
 TEST(QLearning, StartStepsAreRandomAndLaterOnesGreedy) {
   LookupTable table(1, 1, 1 << 17);
-  table.update(cell(0), 5, 1.0);
+  table.update(cell(0), 5, 1.0);  // the greedy action
   for (const int longest : {1, 7}) {
     Agent agent(table,
                 {.policy = {.epsilon = 0.0}, .max_action_repeat = longest, .start_steps = 50}, 1);
@@ -218,9 +221,9 @@ TEST(QLearning, WithoutRepeatedActionsTheirRandomStreamIsNotUsed) {
   EXPECT_NE(after.at("policy.exploration.words"), before.at("policy.exploration.words"));
 }
 
-// gamma = 1/2. The range exceeds the largest known return by a quarter: first 8 * 5/4 = 10.
+// gamma = 1/2. The range is a quarter wider than that of known returns: first 8 * 5/4 = 10.
 TEST(QLearning, AnAdaptiveRangeOfValuesFollowsTheRewards) {
-  OneDimension<QLearning<SDNNC>> agent(SDNNC(network(), 1),
+  OneDimension<QLearning<SDNNC>> agent(SDNNC(small_network(), 1),
                                        {.discount = 0.5, .value_range = ValueRange::adaptive}, 1);
   const auto scale = [&agent]() -> const auto& { return agent.network().output_scale(); };
   const std::vector<double> state = {0.3, 0.6};
@@ -237,15 +240,15 @@ TEST(QLearning, AnAdaptiveRangeOfValuesFollowsTheRewards) {
   EXPECT_EQ(scale().q_low(), 0.0);
   EXPECT_EQ(scale().q_high(), 1.5 * 1.25);
 
-  OneDimension<QLearning<SDNNC>> with_fixed_range(SDNNC(network(), 1), {.discount = 0.5}, 1);
+  OneDimension<QLearning<SDNNC>> with_fixed_range(SDNNC(small_network(), 1), {.discount = 0.5}, 1);
   with_fixed_range.learn(state, 0, 1000.0, state, false);
-  EXPECT_EQ(with_fixed_range.network().output_scale().q_high(), network().q_high);
+  EXPECT_EQ(with_fixed_range.network().output_scale().q_high(), small_network().q_high);
 }
 
-// With averaged weights, greedy actions are those of the highest averaged values, and exploring
-// ones those of the present values, which differ now and then.
+// Greedy acts take the action of the highest averaged value, acts in learning that of the highest
+// present value, which differ now and then.
 TEST(QLearning, GreedyActionsFollowAveragedValues) {
-  approximators::SDNNCConfig config = network();
+  approximators::SDNNCConfig config = small_network();
   config.averaging_interval = 5;
   QLearning<SDNNC> averaging({SDNNC(config, 3), SDNNC(config, 4)},
                              {.learning_rate = 1.0, .policy = {.tie_rule = TieRule::lowest}}, 3);
@@ -257,8 +260,7 @@ TEST(QLearning, GreedyActionsFollowAveragedValues) {
     for (double& x : state) x = random.uniform();
     const double reward = 16.0 * random.uniform() - 8.0;
     averaging.learn(state, Indices{random.below(7), random.below(7)}, reward, state, true);
-    const auto action = averaging.act(state, false);
-    const Indices greedy(action.begin(), action.end());
+    const Indices greedy = testing::copied(averaging.act(state, false));
     const auto learning_action = averaging.act(state);
     for (std::size_t d = 0; d < 2; ++d) {
       averaging.networks()[d].averaged_values(state, workspaces[d], values);
@@ -271,7 +273,7 @@ TEST(QLearning, GreedyActionsFollowAveragedValues) {
 
 // Two dimensions, of 2 and 3 actions: Q_0 = 2 and Q_1 = 6 for action (1, 2), whose mean is 4.
 TEST(QLearning, ACorrectionMovesEveryDimensionByTheErrorOfTheMean) {
-  LookupTable first(1, 5, 2), second(1, 5, 3);
+  LookupTable first = five_cells(2), second = five_cells(3);
   first.update(cell(0), 1, 2.0);
   second.update(cell(0), 2, 6.0);
   QLearning<LookupTable> agent({first, second}, {.learning_rate = 0.5, .discount = 0.5}, 1);
@@ -289,7 +291,7 @@ TEST(QLearning, DimensionsHaveDifferentSeedsAndTheFirstThatOfTheAgent) {
   std::set<std::uint64_t> seeds;
   for (std::size_t d = 0; d < 100; ++d) seeds.insert(seed_of_dimension(7, d));
   for (std::size_t d = 1; d < 100; ++d) seeds.insert(seed_of_dimension(8, d));
-  EXPECT_EQ(seeds.size(), 199U);
+  EXPECT_EQ(seeds.size(), 100U + 99);
 }
 
 TEST(QLearning, RefusesNetworksOfDifferentInputs) {
@@ -317,7 +319,7 @@ TEST(QLearning, TheBestActionByCountsIsTheBestByValues) {
   for (const int n_actions : {0, 7}) {
     for (const TieRule rule : {TieRule::uniform, TieRule::lowest, TieRule::middle}) {
       for (const double tolerance : {0.0, 1.0, 2.5}) {
-        auto config = network();
+        auto config = small_network();
         config.n_actions = n_actions;
         const EpsilonGreedyConfig policy{.tie_rule = rule, .tie_tolerance = tolerance};
         OneDimension<QLearning<SDNNC>> agent(SDNNC(config, 3), {.policy = policy}, 3);
@@ -344,7 +346,7 @@ TEST(QLearning, TheBestActionByCountsIsTheBestByValues) {
 
 // In a range this narrow and far from 0, rounding makes the values of successive counts equal.
 TEST(QLearning, ValuesThatDoNotRiseWithCountsAreComparedThemselves) {
-  auto config = network();
+  auto config = small_network();
   config.q_low = -7.262490008916344e+16;
   config.q_high = -7.26249000891634e+16;
   OneDimension<QLearning<SDNNC>> agent(SDNNC(config, 3), {}, 3);

@@ -15,22 +15,34 @@
 namespace sdnn::agents {
 namespace {
 
+using State = std::vector<double>;
+
+/// Appends a transition with an action of one dimension.
+void append(RandomExperience& experience, const State& state, double action, double reward,
+            const State& next, bool ends = false) {
+  experience.states.insert(experience.states.end(), state.begin(), state.end());
+  experience.next_states.insert(experience.next_states.end(), next.begin(), next.end());
+  experience.actions.resize(1);
+  experience.actions[0].push_back(action);
+  experience.rewards.push_back(reward);
+  experience.ends.push_back(ends);
+}
+
 /// Inputs are a position, a velocity that actions change, and `n_noise` autoregressive noises with
 /// the coefficient `memory`. With `is_rewarded`, positions above 0.8 are rewarded.
 RandomExperience pushed_mass(std::size_t n, std::size_t n_noise, double memory, bool is_rewarded,
                              std::uint64_t seed) {
   core::Random random(seed, core::Stream::useless_inputs);
   RandomExperience experience{.n_inputs = 2 + n_noise, .circular = std::vector<bool>(2 + n_noise)};
-  experience.actions.resize(1);
   double position = 0.5, velocity = 0.0, action = 0.0;
   std::vector<double> noise(n_noise, 0.5);
-  const auto note = [&](std::vector<double>& rows) {
-    rows.push_back(position);
-    rows.push_back(0.5 + 5.0 * velocity);
-    rows.insert(rows.end(), noise.begin(), noise.end());
+  const auto inputs = [&] {
+    State state{position, 0.5 + 5.0 * velocity};
+    state.insert(state.end(), noise.begin(), noise.end());
+    return state;
   };
   for (std::size_t t = 0; t < n; ++t) {
-    note(experience.states);
+    const State state = inputs();
     if (random.below(4) == 0) action = static_cast<double>(random.below(3)) - 1.0;
     velocity = std::clamp(velocity + 0.005 * action, -0.1, 0.1);
     position += velocity;
@@ -41,10 +53,7 @@ RandomExperience pushed_mass(std::size_t n, std::size_t n_noise, double memory, 
           0.5 + memory * (x - 0.5) + std::sqrt(1.0 - memory * memory) * 0.15 * random.normal(), 0.0,
           1.0);
     }
-    note(experience.next_states);
-    experience.actions[0].push_back(action);
-    experience.rewards.push_back(is_rewarded && position > 0.8 ? 1.0 : 0.0);
-    experience.ends.push_back(ends);
+    append(experience, state, action, is_rewarded && position > 0.8 ? 1.0 : 0.0, inputs(), ends);
     if (ends) {
       position = 0.3 + 0.4 * random.uniform();
       velocity = 0.0;
@@ -57,6 +66,7 @@ std::vector<bool> relevant(const RandomExperience& experience) {
   return Relevance(experience).inputs(std::vector<bool>(experience.n_inputs));
 }
 
+// Inputs 0 and 1 are position and velocity of a mass that actions push, the others are noise.
 TEST(Relevance, KeepsInputsThatActionsOrRewardsDependOn) {
   int n_noise_kept = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
@@ -73,15 +83,17 @@ TEST(Relevance, KeepsInputsThatActionsOrRewardsDependOn) {
   EXPECT_LE(n_noise_kept, 0.05 * 10 * 2 * 2 * 8);  // 5 % of all noise inputs
 }
 
-TEST(Relevance, KeepsAllInputsWithoutRelevanceOrWithFewTransitions) {
-  RandomExperience nothing = pushed_mass(500, 3, /*memory=*/0.0, /*is_rewarded=*/false, /*seed=*/1);
-  std::ranges::fill(nothing.states, 0.5);
-  std::ranges::fill(nothing.next_states, 0.5);
-  EXPECT_EQ(relevant(nothing), std::vector<bool>(5, true));
+TEST(Relevance, KeepsAllInputsIfNoneIsRelevantOrBelow100Transitions) {
+  RandomExperience motionless =
+      pushed_mass(500, 3, /*memory=*/0.0, /*is_rewarded=*/false, /*seed=*/1);
+  std::ranges::fill(motionless.states, 0.5);
+  std::ranges::fill(motionless.next_states, 0.5);
+  EXPECT_EQ(relevant(motionless), std::vector<bool>(5, true));
   EXPECT_EQ(relevant(pushed_mass(99, 3, /*memory=*/0.0, /*is_rewarded=*/true, /*seed=*/1)),
             std::vector<bool>(5, true));
 }
 
+// Position and velocity of a pushed mass, then three noises, of which the second is listed.
 TEST(Relevance, KeepsListedInputsAndThoseThatPredictThem) {
   const auto experience = pushed_mass(1000, 3, /*memory=*/0.0, /*is_rewarded=*/false, /*seed=*/1);
   EXPECT_EQ(Relevance(experience).inputs({false, false, false, true, false}),
@@ -98,14 +110,15 @@ TEST(Relevance, FindsInputsThatMatterOnlyTogether) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     core::Random random(seed, core::Stream::useless_inputs);
     RandomExperience experience{.n_inputs = 6, .circular = std::vector<bool>(6)};
-    std::vector<double> state(6, 0.5);
+    State state(6, 0.5);
     for (int t = 0; t < 1000; ++t) {
-      experience.states.insert(experience.states.end(), state.begin(), state.end());
-      experience.rewards.push_back((state[1] > 0.5) == (state[4] > 0.5) ? 1.0 : 0.0);
-      experience.ends.push_back(false);
-      for (double& x : state) x = random.uniform();
-      experience.next_states.insert(experience.next_states.end(), state.begin(), state.end());
+      State next(6);
+      for (double& x : next) x = random.uniform();
+      const double reward = (state[1] > 0.5) == (state[4] > 0.5) ? 1.0 : 0.0;
+      append(experience, state, /*action=*/0.0, reward, next);
+      state = next;
     }
+    experience.actions.clear();  // only the reward decides
     const std::vector<bool> kept = relevant(experience);
     EXPECT_TRUE(kept[1] && kept[4]) << seed;
     n_noise_kept += static_cast<int>(std::ranges::count(kept, true)) - 2;
@@ -113,11 +126,13 @@ TEST(Relevance, FindsInputsThatMatterOnlyTogether) {
   EXPECT_LE(n_noise_kept, 0.05 * 10 * 4);  // 5 % of all other inputs
 }
 
+// Inputs 0 and 1 are position and velocity of a mass that actions push, the others are noise.
 TEST(Relevance, KeepsHardlyAnyOfManyNoiseInputs) {
   int n_noise_kept = 0;
   for (const std::size_t n_noise : {30U, 100U, 300U}) {
     for (std::uint64_t seed = 1; seed <= 3; ++seed) {
-      const std::vector<bool> kept = relevant(pushed_mass(1000, n_noise, 0.0, false, seed));
+      const std::vector<bool> kept =
+          relevant(pushed_mass(1000, n_noise, /*memory=*/0.0, /*is_rewarded=*/false, seed));
       EXPECT_TRUE(kept[0] && kept[1]) << n_noise << ' ' << seed;
       n_noise_kept += static_cast<int>(std::ranges::count(kept, true)) - 2;
     }
@@ -161,26 +176,24 @@ TEST(Relevance, DoesNotDependOnTheOrderOfInputs) {
 RandomExperience two_walks(std::size_t n, std::size_t n_cells, std::uint64_t seed) {
   core::Random random(seed, core::Stream::useless_inputs);
   RandomExperience experience{.n_inputs = 2 * n_cells, .circular = std::vector<bool>(2 * n_cells)};
-  experience.actions.resize(1);
   std::size_t cell = 0, other_cell = 0;
-  const auto note = [&](std::vector<double>& rows) {
-    for (std::size_t i = 0; i < n_cells; ++i) rows.push_back(i == cell ? 1.0 : 0.0);
-    for (std::size_t i = 0; i < n_cells; ++i) rows.push_back(i == other_cell ? 1.0 : 0.0);
+  const auto inputs = [&] {
+    State state(2 * n_cells, 0.0);
+    state[cell] = state[n_cells + other_cell] = 1.0;
+    return state;
   };
   for (std::size_t t = 0; t < n; ++t) {
-    note(experience.states);
+    const State state = inputs();
     const auto action = static_cast<double>(random.below(2));
     if (action > 0.0 && cell + 1 < n_cells) ++cell;
     if (action == 0.0 && cell > 0) --cell;
     other_cell = random.below(n_cells);
-    note(experience.next_states);
-    experience.actions[0].push_back(action);
-    experience.rewards.push_back(-1.0);
-    experience.ends.push_back(false);
+    append(experience, state, action, /*reward=*/-1.0, inputs());
   }
   return experience;
 }
 
+// The first of two one-hot vectors is a cell that actions move, the second a random cell.
 TEST(Relevance, KeepsOrLeavesOutOneHotVectorsAsAWhole) {
   for (const std::size_t n_cells : {5U, 40U}) {
     for (std::uint64_t seed = 1; seed <= 5; ++seed) {
@@ -197,22 +210,18 @@ TEST(Relevance, JudgesTwoBinaryInputsSeparately) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     core::Random random(seed, core::Stream::useless_inputs);
     RandomExperience experience{.n_inputs = 3, .circular = std::vector<bool>(3)};
-    experience.actions.resize(1);
-    std::vector<double> state(3, 0.0);
+    State state(3, 0.0);
     for (int t = 0; t < 1000; ++t) {
-      experience.states.insert(experience.states.end(), state.begin(), state.end());
-      experience.rewards.push_back(state[2]);
       const auto action = static_cast<double>(random.below(2));
-      state = {action, random.below(2) == 0 ? 0.2 : 0.8, random.uniform()};
-      experience.next_states.insert(experience.next_states.end(), state.begin(), state.end());
-      experience.actions[0].push_back(action);
-      experience.ends.push_back(false);
+      const State next{action, random.below(2) == 0 ? 0.2 : 0.8, random.uniform()};
+      append(experience, state, action, /*reward=*/state[2], next);
+      state = next;
     }
     const std::vector<bool> kept = relevant(experience);
     EXPECT_TRUE(kept[0] && kept[2]) << seed;
     n_kept_by_chance += kept[1] ? 1 : 0;
   }
-  EXPECT_LE(n_kept_by_chance, 3);  // in ten seeds
+  EXPECT_LE(n_kept_by_chance, 3);  // of ten seeds
 }
 
 TEST(BinaryGroups, ActionsSteerWhatTheyDecide) {
@@ -240,7 +249,7 @@ Groups groups_of(const std::vector<double>& states, const std::vector<double>& n
 }
 
 TEST(BinaryGroups, HoldInputsThatAreNeverOnTogether) {
-  // Input 3 is a number; inputs 0, 2 and 4 are one-hot, as are 1, 5 and 6.
+  // A row per state. Input 3 is a number; inputs 0, 2 and 4 are one-hot, as are 1, 5 and 6.
   const std::vector<double> states{1, 1, 0, 0.3, 0, 0, 0,  //
                                    0, 0, 1, 0.5, 0, 1, 0,  //
                                    0, 0, 0, 0.7, 1, 0, 1};
@@ -250,11 +259,11 @@ TEST(BinaryGroups, HoldInputsThatAreNeverOnTogether) {
   EXPECT_EQ(groups_of(states, next_states, 7), (Groups{{0, 2, 4}, {1, 5, 6}}));
 }
 
-TEST(BinaryGroups, HoldAllThatAreOnTogetherInTheLastOne) {
+TEST(BinaryGroups, TheLastOneHoldsAllInputsThatAreOnTogether) {
   const std::vector<double> states{0.2, 0.2, 0.2, 0.1,  //
                                    0.2, 0.2, 0.2, 0.2,  //
                                    0.8, 0.8, 0.8, 0.3};
-  EXPECT_EQ(groups_of(states, states, 4), (Groups{{0, 1, 2}}));
+  EXPECT_EQ(groups_of(states, states, 4), (Groups{{0, 1, 2}}));  // input 3 has three values
   // Two binary inputs are no group.
   EXPECT_EQ(groups_of(std::vector{0.0, 0.0, 0.5, 1.0, 1.0, 0.7},
                       std::vector{0.0, 1.0, 0.9, 1.0, 0.0, 0.8}, 3),
@@ -272,17 +281,12 @@ TEST(Relevance, TreatsAnAngleThatWrapsAroundAsASmallChange) {
   // The second input is the speed of the angle, which goes round and round; the third is noise.
   core::Random random(3, core::Stream::useless_inputs);
   RandomExperience experience{.n_inputs = 3, .circular = {true, false, false}};
-  experience.actions.resize(1);
   double angle = 0.0;
   for (int t = 0; t < 2000; ++t) {
-    const double speed = random.uniform();
-    experience.states.insert(experience.states.end(), {angle, speed, random.uniform()});
-    angle += 0.3 * speed;
+    const State state{angle, random.uniform(), random.uniform()};
+    angle += 0.3 * state[1];
     angle -= std::floor(angle);
-    experience.next_states.insert(experience.next_states.end(), {angle, 0.5, 0.5});
-    experience.actions[0].push_back(0.0);
-    experience.rewards.push_back(std::cos(6.2831853 * angle));
-    experience.ends.push_back(false);
+    append(experience, state, 0.0, std::cos(6.2831853 * angle), {angle, 0.5, 0.5});
   }
   EXPECT_EQ(relevant(experience), (std::vector<bool>{true, true, false}));
 }

@@ -12,9 +12,9 @@
 namespace sdnn::agents {
 namespace {
 
-/// An environment that the range follows.
-struct Stream {
-  explicit Stream(double discount) : range(discount), rewards(range.no_rewards()) {}
+/// An environment whose rewards the range follows; `note` returns whether the range has moved.
+struct RewardStream {
+  explicit RewardStream(double discount) : range(discount), rewards(range.no_rewards()) {}
 
   bool note(double reward, bool terminated = false, double dt = 1.0) {
     return range.note(reward, terminated, rewards, dt);
@@ -33,9 +33,9 @@ void expect_range(const ReturnRange& range, double low, double high) {
   EXPECT_EQ(range.high(), high);
 }
 
-// gamma = 15/16: every number is exact.
+// gamma = 15/16: every number is exact. `note` returns whether the range has moved.
 TEST(ReturnRange, GrowsAtFirstByAQuarterMoreThanNeeded) {
-  Stream environment(0.9375);  // no returns before 64 steps
+  RewardStream environment(0.9375);  // no returns before 64 steps
   EXPECT_FALSE(environment.range.is_known());
   EXPECT_FALSE(environment.note(0.0));
   EXPECT_FALSE(environment.range.is_known());
@@ -52,7 +52,7 @@ TEST(ReturnRange, GrowsAtFirstByAQuarterMoreThanNeeded) {
 // The return of a reward of 1 every 100 steps is 1 / (1 - 0.99^100) = 1.58, and of 1 in each tenth
 // of a step 1 / (1 - 0.99^0.1) = 995.5; without durations it would be 100 for both.
 TEST(ReturnRange, DiscountsByDurations) {
-  Stream rare(0.99), frequent(0.99);
+  RewardStream rare(0.99), frequent(0.99);
   for (int i = 0; i < 20000; ++i) {
     rare.note(1.0, false, 100.0);
     frequent.note(1.0, false, 0.1);
@@ -64,8 +64,9 @@ TEST(ReturnRange, DiscountsByDurations) {
   EXPECT_LE(frequent.range.high(), 1000.0 * margin);
 }
 
+// The range contains 0, and is a quarter wider than needed.
 TEST(ReturnRange, OfNegativeRewardsEndsAtZero) {
-  Stream environment(1.0);
+  RewardStream environment(1.0);
   EXPECT_TRUE(environment.note(-4.0));
   expect_range(environment.range, -5.0, 0.0);
 }
@@ -73,7 +74,7 @@ TEST(ReturnRange, OfNegativeRewardsEndsAtZero) {
 // Episodes of one step: returns are rewards, from -20 to 79. Without the lowest five and the
 // highest two they are -15 to 77, a width of 92; above there is room for a quarter of it.
 TEST(ReturnRange, ContainsAllButTheRarestReturns) {
-  Stream environment(0.5);
+  RewardStream environment(0.5);
   for (int i = 1; i <= 100; ++i) environment.note(i - 21.0, true);
   EXPECT_LE(environment.range.low(), -15.0);
   EXPECT_GE(environment.range.low(), -17.0);  // that of fewer returns is kept where it fits
@@ -84,7 +85,7 @@ TEST(ReturnRange, ContainsAllButTheRarestReturns) {
 // Rewards of -200, then of -1: the range may be twice as wide as the lowest return needs.
 TEST(ReturnRange, ShrinksWithReturns) {
   const double sum_of_15_steps = (1.0 - std::pow(0.99, 15)) / (1.0 - 0.99);
-  Stream environment(0.99);
+  RewardStream environment(0.99);
   for (int i = 0; i < 200; ++i) environment.note_episode(15, -200.0);
   EXPECT_LT(environment.range.low(), -200.0 * 0.75 * sum_of_15_steps);
   for (int i = 0; i < 400; ++i) environment.note_episode(15, -1.0);
@@ -97,7 +98,7 @@ TEST(ReturnRange, ShrinksWithReturns) {
 TEST(ReturnRange, OneOutlierWidensItAtMostTwoAndAHalfTimes) {
   for (const double outlier : {1e3, 1e6, -1e3, -1e6, 1e300}) {
     for (const bool terminates : {true, false}) {
-      Stream environment(0.99);
+      RewardStream environment(0.99);
       for (int i = 0; i < 400; ++i) environment.note_episode(50, 1.0, terminates);
       const double width = environment.range.high() - environment.range.low();
       environment.note(outlier);
@@ -112,7 +113,7 @@ TEST(ReturnRange, OneOutlierWidensItAtMostTwoAndAHalfTimes) {
 // The return of a reward of 1 in each step is 100, whatever the limit; a terminated episode's less.
 TEST(ReturnRange, TruncatedEpisodesCountWithTheirFutureRewards) {
   for (const int limit : {10, 50, 200, 1000}) {
-    Stream limited(0.99), ended(0.99);
+    RewardStream limited(0.99), ended(0.99);
     for (int i = 0; i < 20000 / limit; ++i) {
       limited.note_episode(limit, 1.0, false);
       ended.note_episode(limit);
@@ -126,11 +127,11 @@ TEST(ReturnRange, TruncatedEpisodesCountWithTheirFutureRewards) {
 }
 
 TEST(ReturnRange, IsKnownFromTheFirstOfRareRewards) {
-  Stream environment(0.99);
+  RewardStream environment(0.99);
   for (int i = 0; i < 500; ++i) environment.note_episode(20, 0.0);
   EXPECT_FALSE(environment.range.is_known());
   environment.note(1.0, true);
-  expect_range(environment.range, 0.0, 1.25);
+  expect_range(environment.range, 0.0, 1.25);  // a quarter wider than needed
 }
 
 TEST(ReturnRange, EnvironmentsHaveSeparateRewards) {
@@ -142,7 +143,7 @@ TEST(ReturnRange, EnvironmentsHaveSeparateRewards) {
 }
 
 TEST(ReturnRange, MovesFewerThan40TimesIn10000Steps) {
-  Stream environment(0.9);
+  RewardStream environment(0.9);
   core::Random random(1, core::Stream::weights);
   int n_moves = 0;
   for (int i = 0; i < 10000; ++i) {
@@ -153,7 +154,7 @@ TEST(ReturnRange, MovesFewerThan40TimesIn10000Steps) {
 
 // Sums of rewards are clipped to 1e300; the margin is a quarter of the width, at most 2e300.
 TEST(ReturnRange, StaysFiniteWithHugeRewards) {
-  Stream environment(1.0);
+  RewardStream environment(1.0);
   for (int i = 0; i < 9000; ++i)
     environment.note(1e300 * (i / 700 % 2 == 0 ? 1.0 : -1.0), i % 2000 == 0);
   EXPECT_LT(environment.range.high(), 1.7e300);
@@ -165,7 +166,7 @@ TEST(ReturnRange, StaysFiniteWithHugeRewards) {
 
 TEST(ReturnRange, RefusesInconsistentStates) {
   constexpr std::size_t kFewest = 32, kMost = 256;  // returns that are remembered after 1,000
-  Stream environment(0.5);
+  RewardStream environment(0.5);
   for (int i = 0; i < 1000; ++i) environment.note(8.0, i % 2 == 0);
   ReturnRange& range = environment.range;
   testing::expect_damaged_states_refused(range);

@@ -12,7 +12,8 @@
 namespace sdnn::agents {
 namespace {
 
-// 2^40 is 40 powers of two above 1; the headroom is 16, and 4 more after each refusal.
+// A size is a base-2 logarithm. 2^40 is 40 above the size of 1; the headroom is 16, and 4 more
+// after each refusal, so the seventh reward of 2^40 is accepted.
 TEST(RewardScale, RefusesAnOutlierUntilItRecursSevenTimes) {
   RewardScale scale;
   EXPECT_TRUE(scale.accepts(0.0));
@@ -28,14 +29,16 @@ TEST(RewardScale, RefusesAnOutlierUntilItRecursSevenTimes) {
   EXPECT_TRUE(RewardScale().accepts(0x1p1000));
 }
 
+// The upper quartile of the sizes, base-2 logarithms: 90, 0, 0 and -1 of rewards that are not 0.
 TEST(RewardScale, StartsWithTheCommonSizeOfTheFirstRewards) {
   RewardScale scale(std::vector<double>{0.0, 0x1p90, 1.0, -1.0, 0.0, 0.5});
   EXPECT_EQ(scale.size(), 0);
   EXPECT_FALSE(scale.accepts(0x1p90));
 }
 
-// The size falls from 40 to the headroom of 16 above the largest reward of a window, whose size is
-// 0; then, as after each later window, by a quarter, rounded up.
+// A size is a base-2 logarithm; a window has 1,024 rewards. After a window of rewards of size 0 the
+// size falls from 40 to the headroom of 16, then, as after each window, by a quarter, rounded up.
+// end_window returns the size of a window's rewards, or nothing if it is incomplete or all are 0.
 TEST(RewardScale, ForgetsASizeThatRewardsNoLongerReach) {
   RewardScale scale;
   ASSERT_TRUE(scale.accepts(0x1p40));

@@ -3,33 +3,32 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include "sdnn/agents/observations.hpp"
 #include "sdnn/core/random.hpp"
 #include "sdnn/core/state.hpp"
+#include "states.hpp"
 
 namespace sdnn::agents {
 namespace {
 
 TEST(RunningRanges, AreTwoAndAHalfDeviationsAroundTheMean) {
   RunningRanges ranges(2);
-  EXPECT_EQ(ranges[0], std::pair(-2.5, 2.5));
+  EXPECT_EQ(ranges[0], std::pair(-2.5, 2.5));  // mean 0 and deviation 1 before the first value
   for (const double x : {1.0, 3.0, 5.0}) ranges.note(std::vector{x, 7.0});
-  EXPECT_EQ(ranges[0], std::pair(3.0 - 2.5 * 2.0, 3.0 + 2.5 * 2.0));
-  const auto [low, high] = ranges[1];  // a constant
+  EXPECT_EQ(ranges[0], std::pair(3.0 - 2.5 * 2.0, 3.0 + 2.5 * 2.0));  // mean 3, deviation 2
+  const auto [low, high] = ranges[1];                                 // a constant
   EXPECT_LT(low, 7.0);
   EXPECT_GT(high, 7.0);
 }
 
-TEST(RunningRanges, IgnoreMissingReadingsAndStayFinite) {
+TEST(RunningRanges, IgnoreMissingReadingsStayFiniteAndAreRestored) {
   RunningRanges ranges(1);
-  const double infinity = std::numeric_limits<double>::infinity();
-  for (const double x : {2.0, std::nan(""), infinity, 4.0}) ranges.note(std::vector{x});
-  RunningRanges same(1);
-  for (const double x : {2.0, 4.0}) same.note(std::vector{x});
-  EXPECT_EQ(ranges[0], same[0]);
+  for (const double x : {2.0, testing::kNaN, testing::kInfinity, 4.0}) ranges.note(std::vector{x});
+  RunningRanges without_missing(1);
+  for (const double x : {2.0, 4.0}) without_missing.note(std::vector{x});
+  EXPECT_EQ(ranges[0], without_missing[0]);
   for (const double x : {1e308, -1e308, 1e308}) ranges.note(std::vector{x});
   EXPECT_TRUE(std::isfinite(ranges[0].second - ranges[0].first));
   RunningRanges restored(1);
@@ -37,7 +36,8 @@ TEST(RunningRanges, IgnoreMissingReadingsAndStayFinite) {
   EXPECT_EQ(restored[0], ranges[0]);
 }
 
-// Symbols, angles and pairs keep their ranges.
+// Variables 1 and 2 are the cosine and sine of an angle, whose range is fixed. The others have the
+// means 5 and 0 and the deviations 1 and 10, so that their ranges end at 5 - 2.5 and 25.
 TEST(Observations, RunningRangesChangeForNumbersOnly) {
   ObservationConfig config;
   config.low = {0.0, -1.0, -1.0, {}};

@@ -61,14 +61,14 @@ TEST(Softmax, AMaskedActionHasProbabilityZero) {
   const auto terms = softmax_of({9.0, 1.0, 1.0}, allowed);
   EXPECT_EQ(terms[0].weight, 0U);
   EXPECT_EQ(terms[0].entropy_slope, 0);
-  EXPECT_EQ(terms[1].probability, 65536 / 2);
+  EXPECT_EQ(terms[1].probability, 65536 / 2);  // in units of 2^-16
   core::Random random(1, core::Stream::exploration);
   for (int i = 0; i < 50; ++i) EXPECT_NE(draw_term(terms, random), 0U);
 }
 
 TEST(Softmax, PreferencesFarBelowTheBestAreNeverDrawn) {
   const auto terms = softmax_of({0.0, -60.0, 1e5});
-  EXPECT_EQ(terms[2].probability, 65536);
+  EXPECT_EQ(terms[2].probability, 65536);  // 1, in units of 2^-16
   EXPECT_EQ(terms[0].weight + terms[1].weight, 0U);
 }
 
@@ -80,7 +80,8 @@ TEST(Softmax, ActionsAreDrawnByTheirProbability) {
   EXPECT_NEAR(n_second / 10000.0, 0.75, 0.02);
 }
 
-// Three units over five bins: thresholds between bins 0 and 1, at bin 2, between bins 3 and 4.
+// An input has three units over five bins: thresholds between bins 0 and 1, at bin 2, between bins
+// 3 and 4. The second input has none.
 TEST(Thermometers, UnitsWithThresholdsAboveTheBinAreNegative) {
   const approximators::Thermometers thermometers(3, {5, 0});
   ASSERT_EQ(thermometers.n_columns(), 3U);
@@ -92,11 +93,13 @@ TEST(Thermometers, UnitsWithThresholdsAboveTheBinAreNegative) {
     EXPECT_EQ(thermometers.write(bins, signs.data()), 3U);
     EXPECT_EQ(signs, expected[static_cast<std::size_t>(bin)]) << bin;
   }
-  const coding::Bin missing[] = {5, 0};
+  const coding::Bin missing[] = {5, 0};  // a bin beyond the last
   EXPECT_EQ(thermometers.write(missing, signs.data()), 0U);
   EXPECT_EQ(signs, std::vector<std::int8_t>(3, 0));
 }
 
+// Five weights of probabilities: of three actions of dimension 0, then of two of dimension 1. An
+// offset is in distances of neighbouring actions.
 TEST(SoftmaxPolicy, TheMeanOfAnActionAndItsNeighboursIsWeightedByProbabilities) {
   const SoftmaxPolicy policy({3, 2}, 64);
   auto workspace = policy.workspace();

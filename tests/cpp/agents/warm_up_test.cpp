@@ -38,8 +38,9 @@ void step(WarmUp& warm_up, std::size_t environment = 0) {
   learn(warm_up, environment, warm_up.act(draw, always, true, environment));
 }
 
+// `draw` draws one of five actions, `always` allows it.
 TEST(WarmUp, TakesEveryActionAndRepeatsItForSomeSteps) {
-  WarmUp warm_up = warm_up_of(2, 1000);
+  WarmUp warm_up = warm_up_of(/*n_variables=*/2, /*n_steps=*/1000);
   std::set<double> actions;
   int n_changes = 0;
   double last = -1.0;
@@ -55,7 +56,7 @@ TEST(WarmUp, TakesEveryActionAndRepeatsItForSomeSteps) {
 }
 
 TEST(WarmUp, DoesNotRepeatAMaskedAction) {
-  WarmUp warm_up = warm_up_of(2, 1000);
+  WarmUp warm_up = warm_up_of(/*n_variables=*/2, /*n_steps=*/1000);
   double forbidden = -1.0;
   const auto draw_other = [&](core::Pcg64& random, Numbers& action) {
     do draw(random, action);
@@ -71,7 +72,7 @@ TEST(WarmUp, DoesNotRepeatAMaskedAction) {
 
 // A mask for three actions in the second transition; the others allow all actions.
 TEST(WarmUp, RemembersMasks) {
-  WarmUp warm_up = warm_up_of(1, 1000);
+  WarmUp warm_up = warm_up_of(/*n_variables=*/1, /*n_steps=*/1000);
   const Numbers state{0.5}, action{1.0};
   const std::vector<std::uint8_t> mask{0, 1, 1};
   warm_up.learn({false, 0, state, action, 1.0, state, false});
@@ -85,7 +86,7 @@ TEST(WarmUp, RemembersMasks) {
 }
 
 TEST(WarmUp, RemembersDurationsFromTheFirstThatIsNotOneAndRestoresThem) {
-  WarmUp warm_up = warm_up_of(1, 1000);
+  WarmUp warm_up = warm_up_of(/*n_variables=*/1, /*n_steps=*/1000);
   const Numbers state{0.5}, action{1.0}, dts{1.0, 1.0, 2.5, 1.0};
   for (std::size_t t = 0; t < dts.size(); ++t) {
     EXPECT_EQ(core::state_of(warm_up).contains("dts"), t > 2);
@@ -98,7 +99,7 @@ TEST(WarmUp, RemembersDurationsFromTheFirstThatIsNotOneAndRestoresThem) {
                    .terminated = false,
                    .dt = dts[t]});
   }
-  WarmUp restored = warm_up_of(1, 1000);
+  WarmUp restored = warm_up_of(/*n_variables=*/1, /*n_steps=*/1000);
   core::restore(restored, core::state_of(warm_up));
   for (std::size_t t = 0; t < dts.size(); ++t) {
     EXPECT_EQ(warm_up.step(t).dt, dts[t]);
@@ -109,15 +110,16 @@ TEST(WarmUp, RemembersDurationsFromTheFirstThatIsNotOneAndRestoresThem) {
 }
 
 TEST(WarmUp, EvaluationDoesNotChangeItsActions) {
-  WarmUp evaluated = warm_up_of(2, 100), warm_up = evaluated;
+  WarmUp evaluated = warm_up_of(/*n_variables=*/2, /*n_steps=*/100), warm_up = evaluated;
   for (int t = 0; t < 50; ++t) {
     (void)evaluated.act(draw, always, false, 0);
     EXPECT_EQ(evaluated.act(draw, always, true, 0), warm_up.act(draw, always, true, 0));
   }
 }
 
+// A warm-up of three transitions; learn(warm_up, environment, action).
 TEST(WarmUp, RemembersTransitionsInOrder) {
-  WarmUp warm_up = warm_up_of(2, 3);
+  WarmUp warm_up = warm_up_of(/*n_variables=*/2, /*n_steps=*/3);
   warm_up.set_n_environments(2);
   learn(warm_up, 1, {2.0});
   learn(warm_up, 0, {3.0});
@@ -133,12 +135,13 @@ TEST(WarmUp, RemembersTransitionsInOrder) {
   // Two variables of the observation and the next one of three transitions.
   EXPECT_EQ(warm_up.seen().size(), 2U * 2U * 3U);
   warm_up.set_n_environments(1);
-  EXPECT_EQ(warm_up.n_in_all(), 2U);
+  EXPECT_EQ(warm_up.n_in_all(), 2U);  // transitions of two environments are remembered
   EXPECT_THROW((void)warm_up.act(draw, always, true, 1), std::invalid_argument);
 }
 
+// The warm-up has its two transitions, but an action of environment 1 is not learned yet.
 TEST(WarmUp, WaitsForPendingActionsIfOnlyTheAgentsActionsAreLearned) {
-  WarmUp warm_up = warm_up_of(2, 2, /*learns_any_transition=*/false);
+  WarmUp warm_up = warm_up_of(/*n_variables=*/2, /*n_steps=*/2, /*learns_any_transition=*/false);
   warm_up.set_n_environments(2);
   step(warm_up, 0);
   const Numbers pending = warm_up.act(draw, always, true, 1);

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "agents/lives.hpp"
+#include "agents/random_task.hpp"
 #include "agents/small_q_learning.hpp"
 #include "allocation_count.hpp"
 #include "sdnn/agents/q_learning.hpp"
@@ -15,7 +15,8 @@
 namespace sdnn::agents::small_q_learning {
 namespace {
 
-// Rewards 1 and 2 in the first environment, 8 and 8 in the second; gamma = 1/2, alpha = 1.
+// With two-step returns, gamma = 1/2 and alpha = 1, a step is pending until the next one. Rewards
+// are 1 and 2 in environment 0, 8 and 8 in environment 1, which is the state's second input.
 TEST(QLearning, EnvironmentsHaveSeparatePendingSteps) {
   LookupTable table(2, 5, 2);
   Agent agent(table, {.learning_rate = 1.0, .discount = 0.5, .n_steps = 2}, 1);
@@ -46,7 +47,7 @@ TEST(QLearning, EnvironmentsHaveSeparatePendingSteps) {
 }
 
 TEST(QLearning, PendingStepsOfRemovedEnvironmentsAreLearned) {
-  Agent agent(LookupTable(1, 5, 2), {.learning_rate = 1.0, .n_steps = 5}, 1);
+  Agent agent(five_cells(), {.learning_rate = 1.0, .n_steps = 5}, 1);
   agent.set_n_environments(3);
   agent.learn(cell(2), 1, 4.0, cell(3), false, 2);
   EXPECT_EQ(agent.network().value(cell(2), 1), 0.0);
@@ -57,14 +58,14 @@ TEST(QLearning, PendingStepsOfRemovedEnvironmentsAreLearned) {
 // Other environments do nothing here. Weights, random numbers and other tensors without a copy for
 // each environment are shared.
 TEST(QLearning, EachOfSeveralEnvironmentsLearnsLikeASingleOne) {
-  auto alone = vector_agent();
-  testing::World<decltype(alone)> world(2, 9);
-  for (int t = 0; t < 300; ++t) world.step(alone);
+  auto alone = agent_of_two_dimensions();
+  testing::RandomTask<decltype(alone)> task(2, 9);
+  for (int t = 0; t < 300; ++t) task.step(alone);
   for (const std::size_t environment : {0U, 2U}) {
-    auto one_of_four = vector_agent();
+    auto one_of_four = agent_of_two_dimensions();
     one_of_four.set_n_environments(4);
-    testing::World<decltype(alone)> same_world(2, 9, environment);
-    for (int t = 0; t < 300; ++t) same_world.step(one_of_four);
+    testing::RandomTask<decltype(alone)> same_task(2, 9, environment);
+    for (int t = 0; t < 300; ++t) same_task.step(one_of_four);
     const core::State state = core::state_of(one_of_four);
     const std::string prefix =
         environment == 0 ? "" : "environment." + std::to_string(environment) + ".";
@@ -104,13 +105,13 @@ TEST(QLearning, ARestoredAgentAllocatesNothing) {
 // The agent has 7 actions, 20 start steps, 4-step returns and actions of up to 5 steps.
 TEST(QLearning, RefusesInconsistentStates) {
   auto agent = sdnn_agent();
-  testing::World<OneDimension<QLearning<SDNNC>>> world(2, 7);
+  testing::RandomTask<OneDimension<QLearning<SDNNC>>> task(2, 7);
   const core::State at_the_start = core::state_of(agent);
-  while (core::state_of(agent).contains("n_random_left")) world.step(agent);
+  while (core::state_of(agent).contains("n_random_left")) task.step(agent);
   // Until an action is repeated while two steps are pending.
   while (testing::number_of<std::int32_t>(core::state_of(agent), "n_kept") == 0 ||
          core::state_of(agent).at("n_step_buffer.rewards").size() < 2) {
-    world.step(agent);
+    task.step(agent);
   }
   agent.set_learning_rate(std::nullopt);  // damage then includes these optional numbers
   agent.set_epsilon(std::nullopt);

@@ -1,4 +1,4 @@
-/// Sequences of random episodes for agents.
+/// A task of random states and rewards for agents.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -38,14 +38,13 @@ Number copied(Number action) {
   return action;
 }
 
-/// A task of random states and rewards, which are equal for copies of an agent that start with
-/// equal worlds.
+/// A task of random states and rewards, which are equal for equal agents in tasks of equal seeds.
 template <class Agent>
-class World {
+class RandomTask {
  public:
   using Action = decltype(copied(std::declval<Agent&>().act({})));
 
-  World(std::size_t n_inputs, std::uint64_t seed, std::size_t environment = 0)
+  RandomTask(std::size_t n_inputs, std::uint64_t seed, std::size_t environment = 0)
       : environment_(environment),
         random_(seed, core::Stream::sensor_noise),
         state_(n_inputs, 0.5) {}
@@ -53,9 +52,9 @@ class World {
   /// Takes the next of three steps: begins an episode, lets the agent act, or lets it learn.
   /// Returns the action of the agent, if it acted.
   std::optional<Action> step(Agent& agent) {
-    if (begins_) {
+    if (begins_episode_) {
       agent.begin_episode(environment_);
-      begins_ = false;
+      begins_episode_ = false;
       return std::nullopt;
     }
     if (!has_acted_) {
@@ -73,7 +72,7 @@ class World {
     const double reward = scale * static_cast<double>(random_.below(5)) - 2.0 * scale;
     agent.learn(state_, action_, reward, next, terminated, environment_);
     state_ = std::move(next);
-    begins_ = terminated || random_.below(16) == 0;
+    begins_episode_ = terminated || random_.below(16) == 0;
     if constexpr (requires { agent.set_progress(0.0); }) {
       if (random_.below(8) == 0) agent.set_progress(random_.uniform());
       if (random_.below(16) == 0) agent.set_learning_rate(rate());
@@ -94,7 +93,7 @@ class World {
   std::vector<double> state_;
   Action action_{};
   bool has_acted_ = false;  // and not learned yet
-  bool begins_ = true;
+  bool begins_episode_ = true;
 };
 
 /// Expects that the agent allocates nothing when it continues from a restored state, where
@@ -102,8 +101,8 @@ class World {
 template <class Make>
 void expect_that_a_restored_agent_allocates_nothing(const Make& make, auto allocation_count) {
   auto agent = make();
-  World<decltype(make())> world(agent.n_inputs(), 7);
-  for (int t = 0; t < 100; ++t) world.step(agent);
+  RandomTask<decltype(make())> task(agent.n_inputs(), 7);
+  for (int t = 0; t < 100; ++t) task.step(agent);
   core::restore(agent, core::state_of(agent));
   agent.begin_episode();
   core::Random random(5, core::Stream::weights);
