@@ -44,7 +44,7 @@ class CorrelationSearch {
   }
 
   /// Starts pattern i as a copy of the preceding pattern with the largest correlation, inverted if
-  /// it is negative.
+  /// that is negative, or as a random balanced pattern if there is none.
   void begin(std::size_t i, core::Random& random) {
     std::size_t nearest = i;
     for (std::size_t j = 0; j < i; ++j) {
@@ -69,9 +69,9 @@ class CorrelationSearch {
     }
   }
 
-  /// Proposes swaps in the pattern of `draw_pattern()`, evaluated by the first `n_others`.
-  ///
-  /// They are drawn in advance, so that their units are prefetched from memory.
+  /// Tries swaps of two random units in patterns that `draw_pattern()` selects, judged by the
+  /// products with the first `n_others` patterns. Swaps are drawn in advance, so that their units
+  /// are prefetched from memory.
   template <class DrawPattern>
   void propose(std::size_t n_proposals, std::size_t n_others, core::Random& random,
                DrawPattern draw_pattern) {

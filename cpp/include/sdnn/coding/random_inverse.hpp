@@ -37,7 +37,7 @@ inline PatternTable random_inverse_patterns(const RandomInverseConfig& config,
   PatternTable table(static_cast<std::size_t>(config.n_bins), n_units);
   fill_random(table, 0, true, random);
 
-  // The units of each sign, in an order that only the draws below change.
+  // The units of each sign. Each step moves the units to flip to the front, and swaps their signs.
   std::vector<std::size_t> positive;
   std::vector<std::size_t> negative;
   for (std::size_t k = 0; k < n_units; ++k) {

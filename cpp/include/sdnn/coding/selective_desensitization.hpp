@@ -36,7 +36,7 @@ using SharedTables = std::vector<std::shared_ptr<const PatternTable>>;
 
 namespace detail {
 
-/// Place of an input's pattern: in a table, by the input's bin.
+/// The words of a table, and the input whose bin selects a pattern of it.
 struct TableOfInput {
   const core::BitWord* words;
   std::size_t input;

@@ -66,7 +66,7 @@ class AcrobotBatch {
 
   /// Starts an episode of every acrobot whose item of `mask` is not 0.
   ///
-  /// Shape: (size(),). Throws std::invalid_argument.
+  /// Shape: (size(),). Throws std::invalid_argument for another size.
   void reset(std::span<const std::uint8_t> mask) {
     require_size("mask", mask.size());
     for (std::size_t i = 0; i < size_; ++i) {
@@ -177,7 +177,7 @@ class AcrobotBatch {
     const double steps = std::nearbyint(config().decision_interval / config().integration_step);
     const std::size_t n_at_once =
         core::round_up(static_cast<std::size_t>(kStepsPerPoint / steps) + 1, kAcrobotLanes);
-    for (std::size_t i = 0; i < size_; ++i) over_[i] = over_[i] || moving[i];  // undone if all move
+    for (std::size_t i = 0; i < size_; ++i) over_[i] = over_[i] || moving[i];  // step undoes it
     for (std::size_t first = 0; first < padded_size_; first += n_at_once) {
       core::interruption_point();
       move_acrobots(dynamics_,

@@ -1,4 +1,4 @@
-/// The kernel that long codes approach, of many samples and queries, and its weighted sums.
+/// The kernel that products of long codes approach, for samples and queries, and sums over it.
 #pragma once
 
 #include <algorithm>

@@ -337,7 +337,7 @@ class ParallelPerceptron {
     worst->n_chunks > 0 ? answer(tiles, worst->n_chunks) : answer(wide_tiles, kMostChunks);
   }
 
-  /// The potentials of the code of zeros.
+  /// Writes the potentials of a code without active columns: minus the thresholds.
   void start_from_zero(std::int32_t* potentials) const noexcept {
     for (std::size_t i = 0; i < n_units(); ++i) potentials[i] = -thresholds_[i];
   }

@@ -157,9 +157,9 @@ inline std::size_t n_active(const TernaryCode& code, std::size_t n_words) noexce
 
 namespace detail {
 
-/// The bits of a word where the code's entry goes up or down, and those where it does so by 2.
+/// The bits of a word of the columns that rise or fall from one code to another, and, as `again`,
+/// of those that do so by 2.
 struct WordChanges {
-  /// Finds the columns of a word that rise or fall by 1, and those that do so by 2.
   SDNN_INLINE WordChanges(const TernaryCode& from, const TernaryCode& to,
                           std::size_t word) noexcept {
     const std::uint64_t plus = to.positive[word];
@@ -357,7 +357,7 @@ class ColumnLists {
     note_ends(up, down);
   }
 
-  /// The columns that were read last; valid until the next reading.
+  /// The columns that were listed last; valid until the next call of read or read_changes.
   SignedColumns columns() const noexcept {
     return {std::span(plus_).first(n_plus_), std::span(minus_).first(n_minus_)};
   }

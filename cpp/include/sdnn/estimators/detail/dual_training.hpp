@@ -195,7 +195,7 @@ class DualTraining {
     return present_window(samples, &products_[begin * row_size_ + begin], row_size_, rule);
   }
 
-  /// Presents any samples; no correction is pending.
+  /// Presents samples in any order, which needs a copy of their products. Nothing may be pending.
   template <class Rule>
   TrainingCount present_some(std::span<const std::int32_t> samples, Rule& rule) {
     for (std::size_t i = 0; i < layer_->n_units(); ++i) {

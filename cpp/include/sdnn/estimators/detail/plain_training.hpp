@@ -1,4 +1,4 @@
-/// Training as the rule is defined: a sample, its potentials, its corrections.
+/// Training sample by sample: the potentials of a sample, then its corrections.
 #pragma once
 
 #include <cstddef>

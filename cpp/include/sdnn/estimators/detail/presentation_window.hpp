@@ -95,7 +95,7 @@ class PresentationWindow {
   };
 
   std::size_t n_padded_units_;
-  std::size_t stride_;  // not a power of two, at which rows would compete for cache sets
+  std::size_t stride_;  // no power of two, with which rows would compete for cache sets
   core::AlignedBuffer<std::int32_t> by_unit_;    // (n_padded_units, stride)
   core::AlignedBuffer<std::int32_t> by_sample_;  // (kAtOnce, n_padded_units)
   std::vector<Correction> corrections_;
