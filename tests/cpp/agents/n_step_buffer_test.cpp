@@ -82,7 +82,7 @@ TEST(NStepBuffer, DiscountsBySquaresAndRootsForLongerAndShorterSteps) {
 }
 
 // Step 3 leads to the state 4 / 16; a transition from another state does not continue it.
-TEST(NStepBuffer, KnowsTheNextStateOfTheNewestStep) {
+TEST(NStepBuffer, IsContinuedByTheNextStateOfTheNewestStep) {
   NStepBuffer steps = buffer_of(2);
   EXPECT_TRUE(steps.is_continued_by(Numbers{0.9}));  // nothing is pending
   add(steps, 3);

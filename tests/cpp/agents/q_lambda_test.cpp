@@ -233,7 +233,7 @@ int longest_action(QLambda agent, int n_ended) {
 
 // longest_action(agent, n) is the number of steps of the longest random action after n ends.
 TEST(QLambda, EveryEndOfAnEpisodeHalvesTheLongestRandomActionDownToFiveSteps) {
-  const std::vector<std::size_t> many{250, 250};
+  const std::vector<std::size_t> many{250, 250};  // actions of two dimensions
   const auto agent = [&](int longest) { return agent_of({.max_action_repeat = longest}, many); };
   EXPECT_EQ(longest_action(agent(100), 0), 100);
   EXPECT_EQ(longest_action(agent(100), 1), 50);

@@ -89,8 +89,8 @@ TEST(QLearning, RefusesInconsistentStatesOfEnvironments) {
   const auto refused = [&](const core::State& bad, const std::string& message) {
     testing::expect_refused(agent, bad, "state: environment.2." + message);
   };
-  refused(testing::with_number(good, "environment.2.kept_action",
-                               std::int64_t{7}),  // the last action is 6
+  constexpr std::int64_t kNoAction = 7;  // the last action is 6
+  refused(testing::with_number(good, "environment.2.kept_action", kNoAction),
           "kept_action must be an action");
   core::State bad = good;  // a second one is missing
   std::erase_if(bad, [](const auto& item) { return item.first.starts_with("environment.1."); });

@@ -224,7 +224,8 @@ TEST(Relevance, JudgesTwoBinaryInputsSeparately) {
   EXPECT_LE(n_kept_by_chance, 3);  // of ten seeds
 }
 
-TEST(BinaryGroups, ActionsSteerWhatTheyDecide) {
+// The last argument shifts the actions, to show what chance alone gives.
+TEST(BinaryGroups, SteeringIsHowMuchTheActionImprovesThePredictionOfTheNextSymbol) {
   // From each of two symbols action 0 leads to symbol 1, action 1 to symbol 2.
   const detail::BinaryGroup group{.symbols = {1, 1, 2, 2}, .next_symbols = {1, 2, 1, 2}};
   const std::vector<std::uint8_t> actions{0, 1, 0, 1};

@@ -75,7 +75,7 @@ void expect_pure_reads_and_reached_targets(Q model) {
   EXPECT_NEAR(q.value(state, 1), 3.0, 0.5);
 }
 
-TEST(ActionValue, EveryModelReadsWithoutChangeAndMovesToItsTarget) {
+TEST(ActionValue, ReadingChangesNoModelAndCorrectionsReachTheirTarget) {
   expect_pure_reads_and_reached_targets(testing::LookupTable(2, 4, 5));
   expect_pure_reads_and_reached_targets(SDNNC(small_network(), 3));
   expect_pure_reads_and_reached_targets(RBFNetwork({.n_inputs = 2, .n_actions = 5}));

@@ -228,6 +228,7 @@ TEST(HiddenLayer, AddingToAColumnEqualsSettingItsWeights) {
   EXPECT_THROW(added.add_to_column(0, changes, 1), std::invalid_argument);
 }
 
+// Sizes are units, columns, and columns in which corrections count twice.
 TEST(HiddenLayer, RefusesBadSizesAndWeights) {
   EXPECT_THROW(HiddenLayer(0, 1), std::invalid_argument);
   EXPECT_THROW(HiddenLayer(1, 0), std::invalid_argument);

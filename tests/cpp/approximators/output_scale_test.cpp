@@ -41,6 +41,7 @@ TEST(OutputScale, TheExactInverseIsNotRounded) {
   for (int u = 20; u <= 280; ++u) EXPECT_NEAR(kPaper.exact_inverse(kPaper(u)), u, 1e-9);
 }
 
+// A scale maps a range of counts to a range of values.
 TEST(OutputScale, RefusesEmptyAndInfiniteRanges) {
   EXPECT_THROW(OutputScale(20, 20, -1, 1), std::invalid_argument);
   EXPECT_THROW(OutputScale(-1, 20, -1, 1), std::invalid_argument);

@@ -20,6 +20,7 @@ TEST(SymbolPatterns, UnbalancedPatternsHaveIndependentUnits) {
   }
 }
 
+// There must be a symbol, and two units in a pattern.
 TEST(SymbolPatterns, RefuseBadSizes) {
   EXPECT_THROW(table_of(0, 40, true), std::invalid_argument);
   EXPECT_THROW(table_of(2, 1, true), std::invalid_argument);

@@ -82,7 +82,7 @@ TEST(KernelWindow, AddedInputsAndOutputsAreLearned) {
 }
 
 // Targets larger than 20 times their mean size are clipped.
-TEST(KernelWindow, LimitedTargetsKeepAnOutlierOut) {
+TEST(KernelWindow, LimitedTargetsReduceTheEffectOfAnOutlier) {
   KernelWindow window(Numbers{0.0}, Numbers{1.0}, 1, 50, 1.0, 0.1, /*target_limit=*/20.0);
   for (int i = 0; i < 40; ++i) window.learn(Numbers{input_of(i)}, Numbers{i % 2 ? 1.0 : -1.0});
   window.learn(Numbers{0.5}, Numbers{1e9});

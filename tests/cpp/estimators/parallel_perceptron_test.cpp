@@ -147,6 +147,7 @@ TEST(ParallelPerceptron, RefusesWeightsThatCouldOverflow) {
   EXPECT_EQ(layer.check_norms(), INT32_MAX);
 }
 
+// The code has three columns, of an input with two bins; the layer has two units.
 TEST(ParallelPerceptron, RefusesBadArguments) {
   const std::vector<std::int32_t> weights(6), thresholds(2);
   EXPECT_THROW(ParallelPerceptron(small_code(), 0, 1), std::invalid_argument);

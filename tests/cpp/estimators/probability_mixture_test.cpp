@@ -25,7 +25,7 @@ Numbers mixed(const ProbabilityMixture& mixture, const Numbers& shares, const Nu
 }
 
 TEST(ProbabilityMixture, SharesAloneAreTheProbabilities) {
-  const ProbabilityMixture mixture(0);
+  const ProbabilityMixture mixture(0);  // without scorers
   const Numbers out = mixed(mixture, {0.25, 0.75}, {});
   EXPECT_NEAR(out[0], 0.25, 1e-15);
   EXPECT_EQ(mixture.weights(), Numbers{1.0});

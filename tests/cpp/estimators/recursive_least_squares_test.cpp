@@ -91,7 +91,7 @@ TEST(RecursiveLeastSquares, PredictsAFifthBeyondTheRangeOfTargetsAtMost) {
 }
 
 // Without inputs the prediction is a mean of the targets 1 and -1, and then of 1e9.
-TEST(RecursiveLeastSquares, LimitedErrorsKeepAnOutlierOut) {
+TEST(RecursiveLeastSquares, LimitedErrorsReduceTheEffectOfAnOutlier) {
   RecursiveLeastSquares limited(Numbers{}, Numbers{}, 1, 1.0, /*error_limit=*/20.0),
       unlimited(Numbers{}, Numbers{}, 1, 1.0);
   for (int i = 0; i < 100; ++i) {

@@ -53,7 +53,7 @@ TEST(Wiring, HasAsManyStridesAsPartners) {
 }
 
 // Equal configs and seeds give equal codes, with and without given tables.
-TEST(Wiring, IsReproducibleAndThatOfTheNetwork) {
+TEST(Wiring, IsThatOfANetworkOfEqualSettingsAndSeed) {
   const SDNNCConfig config = five_inputs();
   const auto wiring = wiring_of(config, code_books_of(config, 3), 3);
   const SDNNC network(config, 3);
