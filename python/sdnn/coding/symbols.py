@@ -93,7 +93,10 @@ class Categorical(Coding):
             return self.categories
         values = column.tolist()
         if any(map(is_missing, values)):
-            raise ValueError("Input contains NaN: a missing value is not a category")
+            raise ValueError(
+                "Input contains NaN: a missing value is not a category, unless the coding is "
+                f"WithMissing(base={type(self).__name__}(...))"
+            )
         try:
             return tuple(sorted(set(values)))
         except TypeError:

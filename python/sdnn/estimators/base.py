@@ -362,9 +362,9 @@ class BaseSDNN(Fitted, CodedInputs):
             random_state=seed, early_stopping=False, calibrate=False, verbose=0
         )
         codings = self._codings(X, table)
+        # A part of the samples may lack a category, or have no missing value of a column.
         complete = [with_categories(coding, table[:, i]) for i, coding in enumerate(codings)]
-        if complete != codings:
-            model.set_params(coding=[(coding, [index]) for index, coding in enumerate(complete)])
+        model.set_params(coding=[(coding, [index]) for index, coding in enumerate(complete)])
         select = select_pairs_with_part if is_large else select_pairs
         return select(model, X, y, weights, table.shape[1], seed)
 

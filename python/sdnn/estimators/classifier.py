@@ -190,6 +190,10 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
         probabilities: Floats = self._probabilities(self._bins_of_one(x), n_threads=1)[0]
         return probabilities
 
+    def _validate_to_begin(self) -> None:
+        super()._validate_to_begin()
+        self._require_classes([])
+
     def _require_classes(self, classes: ArrayLike | None) -> None:
         """Raise ValueError for a class weight, which only `fit` uses, or missing first classes."""
         if self.class_weight is not None:

@@ -55,6 +55,10 @@ def column_indices(
     """
     chosen: object = columns(table) if callable(columns) else columns
     if isinstance(chosen, slice):
+        if isinstance(chosen.start, str) or isinstance(chosen.stop, str):  # the last is included
+            first = 0 if chosen.start is None else index_of(chosen.start, names, n_inputs)
+            last = n_inputs - 1 if chosen.stop is None else index_of(chosen.stop, names, n_inputs)
+            chosen = slice(first, last + 1, chosen.step)
         return list(range(n_inputs))[chosen]
     if isinstance(chosen, str) or not isinstance(chosen, Iterable):
         return [index_of(chosen, names, n_inputs)]

@@ -6,7 +6,7 @@ import abc
 import contextlib
 import dataclasses
 import datetime
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from numbers import Number
 from typing import Any, Self
 
@@ -18,7 +18,7 @@ from sklearn.utils.multiclass import check_classification_targets, unique_labels
 from sklearn.utils.validation import validate_data
 
 from sdnn.coding import Coding, WithMissing
-from sdnn.coding.symbols import missing_as_nan
+from sdnn.coding.symbols import is_missing, missing_as_nan
 from sdnn.estimators.columns import (
     Array,
     Codings,
@@ -45,16 +45,26 @@ DATES_HINT = "give numbers for it, such as the hour with coding=[(Circular(perio
 
 def refuse_dates(X: object) -> None:
     """Raise ValueError for a column of dates or times, which scikit-learn may take for numbers."""
-    if hasattr(X, "iloc") and hasattr(X, "columns"):
-        names, rows = list(X.columns), X.iloc[:1].astype(object).to_numpy()
-    elif getattr(X, "ndim", 0) == 2 and getattr(X, "dtype", np.dtype(float)).kind in "OmM":
-        rows = np.asarray(X)[:1]
-        names = list(range(rows.shape[1]))
-    else:
-        return
-    for name, value in zip(names, rows[0] if len(rows) else (), strict=False):
+    for name, column in columns_of_objects(X):
+        value = next((value for value in column if not is_missing(value)), None)
         if isinstance(value, DATES) or hasattr(value, "to_timestamp"):  # pandas.Period
             raise ValueError(f"X has dates or times in column {name!r}: {DATES_HINT}")
+
+
+def columns_of_objects(X: Any) -> Iterator[tuple[object, Iterable[object]]]:
+    """Yield the name and the values of each column whose type does not say that it has numbers."""
+    if hasattr(X, "iloc") and hasattr(X, "dtypes"):
+        for index, (name, column_type) in enumerate(zip(X.columns, X.dtypes, strict=True)):
+            if column_type.kind in "OmM":
+                yield name, X.iloc[:, index]
+    elif hasattr(X, "iter_columns"):  # polars
+        for column in X.iter_columns():
+            yield column.name, column
+    else:
+        table = np.array(X, dtype=object) if isinstance(X, list | tuple) else X
+        is_array = getattr(table, "ndim", 0) == 2 and hasattr(table, "dtype")
+        if is_array and table.dtype.kind in "OmM":
+            yield from enumerate(np.asarray(table).T)
 
 
 def with_types_kept(X: object) -> object:
@@ -236,7 +246,8 @@ class CodedInputs(BaseEstimator):
             column = table[:, index]
             numbers = numbers_to_range(coding, column)
             if numbers is not None and np.isfinite(numbers).any():
-                low, high = self._range(f"column {index} of X", numbers[np.isfinite(numbers)])
+                name = (self._feature_names() or range(len(codings)))[index]
+                low, high = self._range(f"column {name!r} of X", numbers[np.isfinite(numbers)])
                 column = column[~((numbers < low) | (numbers > high))]
             try:
                 fitted.append(coding.fit(column, n_units))
@@ -278,6 +289,8 @@ class CodedInputs(BaseEstimator):
     def _row(self, x: Sample, code: InputCode) -> Array:
         """Return one sample, a row or a mapping from names, checked, shape (n_features,)."""
         codings = code.codings
+        if self._feature_names() and hasattr(x, "index") and hasattr(x, "to_dict"):
+            x = x.to_dict()  # a row of a data frame of pandas has names
         values = self._values_of(x, codings) if isinstance(x, Mapping) else x
         if code.is_numeric:
             try:
@@ -327,6 +340,22 @@ class CodedInputs(BaseEstimator):
         return table
 
 
+def as_numbers(y: object) -> object:
+    """Return targets unchanged, or words and objects as numbers, missing ones as NaN."""
+    try:
+        targets = np.asarray(y)
+    except ValueError:  # rows of different lengths, which scikit-learn refuses
+        return y
+    if targets.dtype.kind in "mM":
+        raise ValueError("y must be numbers, got dates or times")
+    if targets.ndim == 0 or targets.dtype.kind not in "OSU":
+        return y
+    try:
+        return missing_as_nan(targets)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"y must be numbers: {error}") from None
+
+
 class CodedRegressor(RegressorMixin, CodedInputs):
     """Validation of numeric targets, of one output or several."""
 
@@ -345,11 +374,9 @@ class CodedRegressor(RegressorMixin, CodedInputs):
             raise ValueError(
                 f"{type(self).__name__} requires y to be passed, but the target y is None"
             )
-        table, targets = self._validated(X, y, codings, multi_output=True, y_numeric=True)
-        try:
-            return table, np.asarray(targets, dtype=np.float64)
-        except ValueError as error:
-            raise ValueError(f"y must be numbers: {error}") from None
+        numbers = as_numbers(y)
+        table, targets = self._validated(X, numbers, codings, multi_output=True, y_numeric=True)
+        return table, np.asarray(targets, dtype=np.float64)
 
     def _ranges_of(self, targets: Floats) -> tuple[Floats, Floats]:
         """Return the lowest and highest target of each output, perhaps without outliers."""

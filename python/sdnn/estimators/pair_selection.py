@@ -11,13 +11,12 @@ import warnings
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, clone, is_classifier
-from sklearn.utils import _safe_indexing
 
 from sdnn.coding import Coding, CorrelationMatrix, Symbolic, WithMissing
 from sdnn.coding.symbols import present
 from sdnn.estimators.columns import Array, Floats, Pairs, input_pairs
 from sdnn.estimators.outliers import OutlierWarning
-from sdnn.estimators.training import FEWEST_SAMPLES, held_out_fifth
+from sdnn.estimators.training import FEWEST_SAMPLES, held_out_fifth, samples_in
 
 PART = 5000  # samples that decide, of larger samples
 EPOCHS_OF_PART = 4
@@ -67,7 +66,7 @@ def select_pairs(
         chosen_weights = None if weights is None else weights[is_chosen]
         if chosen_weights is not None and not chosen_weights.any():
             chosen_weights = None  # fit refuses weights that are all 0
-        return _safe_indexing(X, np.flatnonzero(is_chosen)), labels[is_chosen], chosen_weights
+        return samples_in(X, np.flatnonzero(is_chosen)), labels[is_chosen], chosen_weights
 
     held_out = samples(is_held)
     while True:
@@ -94,6 +93,4 @@ def select_pairs_with_part(
     targets = np.asarray(y)[rows]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", OutlierWarning)  # the whole sample warns of its outliers
-        return select_pairs(
-            model, _safe_indexing(X, rows), targets, weights_of_part, n_features, seed
-        )
+        return select_pairs(model, samples_in(X, rows), targets, weights_of_part, n_features, seed)

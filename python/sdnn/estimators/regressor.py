@@ -45,7 +45,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
     out_of_range : {"clip", "widen", "error"}, default="clip"
         Treatment of targets outside the output range; "widen" stretches the learned function,
         for each sample of a stream by its width and margins at most. Inputs outside their range are
-        clipped unless "error". The first causes an `OutOfRangeWarning`.
+        clipped, or in learning refused with "error". The first causes an `OutOfRangeWarning`.
     refit : bool, default=False
         Whether early stopping trains again on the whole sample, for the best number of epochs.
     calibrate : bool, default=False
@@ -151,14 +151,16 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         Raises
         ------
         AttributeError
-            If the model was not fitted with ``calibrate=True``.
+            If the model was not fitted with ``calibrate=True``, or has learned more since.
         ValueError
             If ``coverage`` is not within (0, 1), or needs more samples than were held out.
         """
         share = coverage_of(coverage)
         outputs = self.predict(X)  # first, since it raises if the model is not fitted
         if not hasattr(self, "held_out_residuals_"):
-            raise AttributeError("predict_interval needs a fit with calibrate=True")
+            raise AttributeError(
+                "predict_interval needs a fit with calibrate=True as the last learning"
+            )
         widths = error_bounds(np.abs(self.held_out_residuals_), self.held_out_counts_, share)
         width: Array = widths[0] if self._flat else widths
         return np.stack([outputs - width, outputs + width], axis=-1)
@@ -166,13 +168,21 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
         """Train, and with `calibrate` note the errors of samples that another network held out."""
         super()._fit(X, y, sample_weight)
-        for name in ("held_out_residuals_", "held_out_counts_"):
-            self.__dict__.pop(name, None)  # of an earlier fit
+        self._forget_held_out()
         if self.calibrate:
             held = learn_without_fifth(self, X, y, sample_weight, is_stratified=False)
             errors = held.y.astype(np.float64) - cast(SDNNRegressor, held.model).predict(held.X)
             self.held_out_residuals_ = errors.reshape(len(errors), -1)
             self.held_out_counts_ = held.weights
+
+    def _forget_held_out(self) -> None:
+        """Delete the errors of held-out samples, which are those of an earlier network."""
+        self.__dict__.pop("held_out_residuals_", None)
+        self.__dict__.pop("held_out_counts_", None)
+
+    def _learn(self, bins: Ints, targets: Array) -> None:
+        self._forget_held_out()
+        super()._learn(bins, targets)
 
     def _set_outputs(self, y: ArrayLike) -> int:
         """Note the outputs and their range; return the number of units."""

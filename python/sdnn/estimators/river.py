@@ -6,13 +6,13 @@ import collections
 import math
 import sys
 from collections.abc import Sequence
+from numbers import Integral, Real
 from typing import Literal, overload
 
 import numpy as np
 from river import base
 from river.conf import Interval
 
-from sdnn.coding.symbols import is_missing
 from sdnn.estimators.classifier import SDNNClassifier
 from sdnn.estimators.columns import Floats
 from sdnn.estimators.experts import ClassificationExperts, RegressionExperts
@@ -152,9 +152,11 @@ class RiverClassifier(StreamEstimator, base.Classifier):
         return True
 
     def _check_target(self, y: object) -> None:
+        is_whole = isinstance(y, Integral | np.bool_) or (isinstance(y, Real) and y == y // 1)
+        require(isinstance(y, str) or is_whole, "y", "be a word, a whole number or a bool", y)
         first = self.targets[0] if self.targets else y
-        is_label = not is_missing(y) and isinstance(y, str) == isinstance(first, str)
-        require(is_label, "y", f"be a label, like {shown(first)}", y)
+        is_alike = isinstance(y, str) == isinstance(first, str)
+        require(is_alike, "y", f"be a label, like {shown(first)}", y)
 
     def _learn(self, sample: Sample, y: Target) -> None:
         if y not in self.fitted.classes_:
@@ -182,8 +184,8 @@ class RiverClassifier(StreamEstimator, base.Classifier):
             return max(dict.fromkeys(self.targets), key=self.targets.count, default=None)
         sample = cleaned_sample(x)
         if self.mixed is None:
-            return self.fitted.predict_one(self._sample(sample))
-        return self.fitted.classes_[np.argmax(self._mix(self._estimates(sample)))]
+            return np.asarray(self.fitted.predict_one(self._sample(sample))).item()
+        return self.fitted.classes_.tolist()[np.argmax(self._mix(self._estimates(sample)))]
 
     def predict_proba_one(self, x: Features, **_options: object) -> dict[Target, float]:
         """Estimate the probability of each label; none before the first sample.

@@ -30,12 +30,14 @@ Sample = dict[str, Any]
 Target = Any  # a number or a label
 REMEMBERED = 1000  # number of last samples kept to learn new features and categories from
 FEWEST = 5  # number of kept samples that must have a new feature or category
+MOST_STRAY_WORDS = 1 / 20  # largest share of words such as "n/a" among the numbers of a feature
 MOST_FEATURES = 1000  # later features are ignored
 MOST_CATEGORIES = 1000  # later categories of a feature count as missing values
 
 
 def cleaned_sample(x: Features) -> Sample:
     """Return a sample with strings as names and None for missing values."""
+    require(isinstance(x, Mapping), "x", "be a dict of features", x, TypeError)
     sample = {str(name): value for name, value in x.items()}
     if len(sample) < len(x):
         raise ValueError(f"x must have names that differ as text, got {shown(list(x))}")
@@ -105,6 +107,7 @@ class StreamEstimator:
         self.model = clone(self.default_model) if model is None else model
         is_model = isinstance(self.model, model_class)
         require(is_model, "model", f"be an {model_class.__name__}", model, TypeError)
+        self.model._validate_to_begin()
         self.grace_period = whole("grace_period", grace_period, 2, 2**53)
         self.follows_ranges = flag("follows_ranges", follows_ranges)
         is_choice = isinstance(experts, str) and experts in EXPERTS
@@ -149,9 +152,11 @@ class StreamEstimator:
         ):
             try:
                 self._begin()
-            except ValueError:  # caused by a setting of the model: the samples were checked
+            except BaseException:  # a setting of the model, or an interrupt
                 self.samples.pop()
                 self.targets.pop()
+                self.n_learned -= 1
+                self.fitted = self.mixed = None
                 raise
 
     @abc.abstractmethod
@@ -221,8 +226,8 @@ class StreamEstimator:
             if not present(coding).is_numeric:
                 is_mixed = coding.learns and 0 < n_texts < len(values)
                 self.reads[name] = str if is_mixed else unchanged
-            elif n_texts and any(number_of(value) is None for value in values):
-                coding, self.reads[name] = Symbolic(), str  # words that spell no numbers
+            elif sum(number_of(value) is None for value in values) > MOST_STRAY_WORDS * len(values):
+                coding, self.reads[name] = Symbolic(), str
             else:
                 self.reads[name] = number_of
             codings.append(coding if isinstance(coding, WithMissing) else WithMissing(base=coding))
@@ -241,6 +246,7 @@ class StreamEstimator:
         # A twentieth of the samples is enough while there are few of them.
         fewest = min(FEWEST, max(1, len(self.samples) // 20))
         frequent = [name for name, count in counts.items() if count >= fewest]
+        frequent = [name for name in frequent if self._varies(name)]
         names = sorted(frequent[:MOST_FEATURES])  # independent of the order in dictionaries
         if not names:
             return
@@ -289,6 +295,11 @@ class StreamEstimator:
             else:
                 self.ranges.extend(ranges, frame)
 
+    def _varies(self, name: str) -> bool:
+        """Return whether a feature has a range to learn; one of words learns new words later."""
+        values = {sample.get(name) for sample in self.samples}
+        return len(values) > 1 or isinstance(next(iter(values)), str)
+
     def _is_new(self, name: str, value: object) -> bool:
         """Return whether a feature, or a category of it, is not known."""
         if value is None or name not in self.reads:
@@ -336,7 +347,8 @@ class StreamEstimator:
         frequent = [addition for addition, count in counts.items() if count >= FEWEST]
         new: list[str] = []
         if isinstance(self.model.pairs, str):  # a list of pairs cannot name new features
-            new = sorted(name for name, _ in frequent if name not in self.reads)
+            later = (name for name, _ in frequent if name not in self.reads)
+            new = sorted(name for name in later if self._varies(name))
         changed: dict[int, Coding] = {}
         for index, name in enumerate(self.reads):
             categories = [category for other, category in frequent if other == name]

@@ -32,6 +32,8 @@ def test_columns_are_selected_as_in_a_column_transformer():
         ([2, 0], [2, 0]),
         (np.array([0, 2]), [0, 2]),
         (slice(1, None), [1, 2]),
+        (slice("b", "c"), [1, 2]),
+        (slice(None, "b"), [0, 1]),
         ([True, False, True], [0, 2]),
         (lambda table: [table.shape[1] - 1], [2]),
     ]:

@@ -96,3 +96,11 @@ def test_pair_names_are_those_of_the_parameter():
     assert SDNNClassifier(**OPTIONS, pairs=[(0, 1), (2, None)]).fit(X, XOR).pair_names_ == [
         (0, 1), (2, None),
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_features_are_selected_where_only_the_held_out_part_lacks_a_value(seed):
+    incomplete = X[:60].copy()
+    incomplete[seed * 7, 2] = np.nan
+    model = SDNNClassifier(**{**OPTIONS, "random_state": seed}, pairs="auto")
+    assert model.fit(incomplete, XOR[:60]).predict(incomplete).shape == (60,)
