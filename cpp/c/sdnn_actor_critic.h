@@ -6,6 +6,7 @@
 #define SDNN_IS_ACTOR_CRITIC
 #define SDNN_IMAGE_MAGIC UINT32_C(0x414e4453) /* "SDNA" */
 #define SDNN_N_RANDOMS 2
+#include "sdnn_durations.h"
 #include "sdnn_learner.h"
 #include "sdnn_softmax.h"
 #include "sdnn_thermometers.h"
@@ -49,6 +50,9 @@ typedef struct {
   int32_t exponent;          /* values and the critic's weights count units of 2 to this power */
   uint32_t rate, actor_rate; /* times 2^16 */
   sdnn_states states;
+#ifdef SDNN_DURATIONS_H
+  sdnn_durations durations;
+#endif
   sdnn_code codes[2]; /* of the state that was learned last, and of another one */
   uint8_t pending;    /* the code of the state that was learned last */
   uint8_t has_next;   /* whether the last transition did not terminate */
@@ -299,6 +303,9 @@ static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observat
     return;
   }
   if (!is_next || !agent->has_next) sdnn_end(agent);
+#ifdef SDNN_DURATIONS_H
+  agent->durations.pending = agent->durations.given;
+#endif
   code = sdnn_other(agent, bins);
   agent->pending = (uint8_t)(1 - agent->pending);
   sdnn_read_next(&agent->states, limited, next_observation, bins);

@@ -57,6 +57,13 @@ class sdnn_learner {
              const int32_t (&next_observation)[SDNN_N_OBSERVED], bool terminated) {
     sdnn_learn(&agent_, observation, action, reward, next_observation, terminated);
   }
+#ifdef SDNN_DURATIONS_H
+  void learn_over(const int32_t (&observation)[SDNN_N_OBSERVED], action_type action, int32_t reward,
+                  const int32_t (&next_observation)[SDNN_N_OBSERVED], bool terminated,
+                  uint32_t dt) {
+    sdnn_learn_over(&agent_, observation, action, reward, next_observation, terminated, dt);
+  }
+#endif
 #ifdef SDNN_HAS_PROGRESS
   void set_progress(uint32_t progress) { sdnn_set_progress(&agent_, progress); }
 #endif

@@ -160,6 +160,7 @@ static inline uint32_t sdnn_best_place(const sdnn_agent* agent, const sdnn_keepe
 #define sdnn_best_place sdnn_best_place_in_each
 #endif
 
+#include "sdnn_learn_over.h"
 #ifdef SDNN_HAS_EPISODES
 /* Begins an episode of greedy steps, apart from the one of which the agent learns. */
 static inline void sdnn_begin_greedy_episode(const sdnn_agent* agent,

@@ -209,6 +209,9 @@ static inline void sdnn_move(sdnn_agent* agent, const sdnn_code* code, const uin
       if (agent->weights[j] == SDNN_LARGEST_WEIGHT) used |= (uint32_t)SDNN_LARGEST_WEIGHT;
     }
   }
+#ifdef SDNN_DURATIONS_H
+  sdnn_set_durations(&agent->durations, agent->durations.pending.decay);
+#endif
 }
 
 /* Computes the error r + gamma Q' - Q of a transition from the state of a code, and the drift
@@ -240,6 +243,9 @@ static inline void sdnn_end_traces(sdnn_agent* agent) {
     }
     agent->is_live[row] = 0;
   }
+#ifdef SDNN_DURATIONS_H
+  sdnn_set_durations(&agent->durations, 0);
+#endif
   agent->old_value = 0;
 }
 

@@ -5,6 +5,7 @@
 
 #define SDNN_IMAGE_MAGIC UINT32_C(0x4c4e4453) /* "SDNL" */
 #define SDNN_N_RANDOMS 4
+#include "sdnn_durations.h"
 #include "sdnn_exploration.h"
 #include "sdnn_readout.h"
 #ifdef SDNN_HISTORY
@@ -46,6 +47,9 @@ typedef struct {
   uint32_t step;               /* of the episode */
   uint32_t kept[SDNN_N_DIMENSIONS], action[SDNN_N_DIMENSIONS];
   sdnn_states states;
+#ifdef SDNN_DURATIONS_H
+  sdnn_durations durations;
+#endif
   sdnn_code codes[2]; /* of the pending state, and of another one */
   uint8_t pending;    /* the code of the state of the pending transition */
   uint8_t is_pending; /* whether a transition is to be learned */
@@ -364,6 +368,9 @@ static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observat
   sdnn_keep_next(&agent->states, next_observation);
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) agent->action[d] = limited[d];
   agent->reward = reward;
+#ifdef SDNN_DURATIONS_H
+  agent->durations.pending = agent->durations.given;
+#endif
   agent->is_pending = 1;
   if (SDNN_START_STEPS == 0 && reward != 0 &&
       sdnn_lacks_rewards(agent)) { /* search for more in twice as many steps */

@@ -7,7 +7,7 @@ import pytest
 from bare_processors import BARE_TARGETS
 from c_histories import POLICIES, actor_observer, check_policy, policy
 from c_keeping import check_best, cut_power
-from c_learners import LEARNERS, actor, check_learning, network, several, states
+from c_learners import LEARNERS, TIMED, actor, check_learning, exported, network, several, states
 from c_policies import (
     AGENTS,
     ALONE,
@@ -21,7 +21,7 @@ from c_policies import (
     run,
     write_policy,
 )
-from sdnn.export import c_header, export_c_header
+from sdnn.export import export_c_header
 
 ARM = TARGETS["arm"]
 
@@ -74,10 +74,11 @@ def test_learning_compiles_for_microcontrollers_with_few_library_calls(name, kin
     """At most a multiplication and shifts of 64 bits are called from the compiler's library."""
     needs("clang", "nm")
     agent = LEARNERS[name]()
-    (tmp_path / "agent.h").write_text(c_header(agent, "agent", learning=True).text)
+    (tmp_path / "agent.h").write_text(exported(name).text)
     act, action = "a[0] = agent_act(&agent, x)", "a[0]"
     if agent.n_dimensions > 1:
         act, action = "agent_act(&agent, x, a)", "a"
+    learn, dt = ("agent_learn_over", ", 99") if name in TIMED else ("agent_learn", "")
     memory, episode = "", ""
     if agent.history != "none":
         memory, episode = "agent_greedy_episode episode;", "&episode, "
@@ -94,7 +95,7 @@ def test_learning_compiles_for_microcontrollers_with_few_library_calls(name, kin
           uint32_t a[2] = {{0, 0}};
           agent_begin(&agent);
           {act};
-          agent_learn(&agent, x, {action}, 1, x, 0);
+          {learn}(&agent, x, {action}, 1, x, 0{dt});
           agent_save(&agent, image);
           agent_load(&agent, image);
           agent_begin_keeping(&keeper, image, agent_read_memory, agent_write_memory, 30);
@@ -120,7 +121,7 @@ def test_learning_compiles_for_microcontrollers_with_few_library_calls(name, kin
 @pytest.mark.parametrize("name", LEARNERS)
 def test_learning_compiles_where_int_has_16_bits(name, needs, tmp_path):
     needs("clang")
-    (tmp_path / "agent.h").write_text(c_header(LEARNERS[name](), "agent", learning=True).text)
+    (tmp_path / "agent.h").write_text(exported(name).text)
     (tmp_path / "agent.c").write_text('#include "agent.h"\n')
     options = (*STRICT, "-ffreestanding", "-Wno-unused-function", "--target=msp430")
     run("clang", *options, "-fsyntax-only", tmp_path / "agent.c")

@@ -60,6 +60,12 @@ _LARGEST = 2**31  # limit of the ranges of observations and actions
     " approximator.averaging_interval=0 and approximator.weight_limit=127.",
 )
 @click.option(
+    "--durations",
+    is_flag=True,
+    help="With --learning or --new: the header also learns steps of unequal length, by"
+    " NAME_learn_over. Not for sdnn-c.",
+)
+@click.option(
     "--new",
     is_flag=True,
     help="Instead of RUN, an agent that has learned nothing and learns on the processor.",
@@ -128,6 +134,7 @@ def export(
     source: Path | None,
     path: Path,
     learning: bool,
+    durations: bool,
     name: str | None,
     fraction_bits: int | None,
     flash: int | None,
@@ -164,10 +171,14 @@ def export(
         if not new and is_given:
             raise click.UsageError(f"{option} needs --new: the agent of RUN has its own")
     learning = learning or new
+    if durations and not learning:
+        raise click.UsageError("--durations needs --learning or --new: policies learn nothing")
     with run_command(option_words if source is None else words_of_run(source)):
         model = None if source is None or source.is_dir() else _estimator_in(source)
         prefix = path.stem if name is None else name
         if model is not None:
+            if durations:
+                raise click.UsageError("--durations is for agents: an estimator has no steps")
             if fraction_bits is not None:
                 raise click.UsageError("--fraction-bits is for agents: an estimator has doubles")
             with _errors_of_options(name, flash_bytes="--flash"):
@@ -176,10 +187,19 @@ def export(
                 )
             click.echo(_words(path, made, learning, {} if as_json else None))
             return
-        agent = _new_agent(**options) if source is None else _read_agent_of(source)
+        if source is None:
+            agent = _new_agent(durations=durations, **options)
+        else:
+            agent = _read_agent_of(source)
         try:
-            with _errors_of_options(name, fraction_bits="--fraction-bits"):
-                header = c_header(agent, prefix, fraction_bits=fraction_bits, learning=learning)
+            with _errors_of_options(name, fraction_bits="--fraction-bits", durations="--durations"):
+                header = c_header(
+                    agent,
+                    prefix,
+                    fraction_bits=fraction_bits,
+                    learning=learning,
+                    durations=durations,
+                )
         except (TypeError, RuntimeError) as error:
             place = "" if source is None else f"{source}: "
             raise click.ClickException(f"{place}{error}") from error
@@ -286,6 +306,8 @@ def _new_agent(
     settings: Sequence[str],
     seed: int | None,
     missing: Missing | None,
+    *,
+    durations: bool,
 ) -> AnyAgent:
     """Make an untrained agent from the options of ``sdnn export`` without a file."""
     import gymnasium as gym
@@ -316,12 +338,13 @@ def _new_agent(
             ram_bytes=ram,
             seed=seed or 0,
             missing=missing or "error",
+            durations=durations,
             angles=[i for i, text in enumerate(ranges) if text == "angle"],
             **parts,
         )
     except (ValueError, OverflowError, MemoryError) as error:
         name, problem = blamed(error)
-        options_of = {"ram_bytes": "--ram"}
+        options_of = {"ram_bytes": "--ram", "durations": "--durations"}
         options_of |= {"observation_space": "--range", "action_space": "--actions"}
         for table, part in parts.items():
             if hasattr(part, name):

@@ -261,5 +261,5 @@ class ActorCriticLearner(Learner[_core.LinearSDNN], ActorCriticWriter):
         n_last = self.n_inputs if self.codes_missing else self.n_observed
         n_bytes = self.with_states(n_bytes, 4 * n_last, next_bins=False)
         n_flags = 3 + self.n_critic_rows + sum(self.n_rows())  # a byte each
-        n_bytes += 2 * self.code_bytes() + n_flags
+        n_bytes += 2 * self.code_bytes() + self.duration_bytes + n_flags
         return rounded_up(n_bytes, 8)

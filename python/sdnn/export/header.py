@@ -24,6 +24,7 @@ def export_c_header(
     name: str | None = None,
     fraction_bits: int | None = None,
     learning: bool = False,
+    durations: bool = False,
 ) -> CHeader:
     """Write an agent as a C header and return it.
 
@@ -32,7 +33,9 @@ def export_c_header(
     """
 
     def make(prefix: str) -> CHeader:
-        return c_header(agent, prefix, fraction_bits=fraction_bits, learning=learning)
+        return c_header(
+            agent, prefix, fraction_bits=fraction_bits, learning=learning, durations=durations
+        )
 
     return write_header(path, name, make)
 
@@ -43,6 +46,7 @@ def c_header(
     *,
     fraction_bits: int | None = None,
     learning: bool = False,
+    durations: bool = False,
 ) -> CHeader:
     """Return an agent as a C header: its greedy policy, or the agent itself, which learns.
 
@@ -67,6 +71,9 @@ def c_header(
         Write an agent that learns. It begins with what the agent has learned so far, in a new
         episode. An `SDNNQLearning` needs ``averaging_interval=0``, ``weight_limit=127`` and
         actions of one dimension.
+    durations : bool, optional
+        With ``learning``, also write ``NAME_learn_over``, which learns a transition of any duration
+        as ``Transition(..., dt=dt)`` does. Not for an `SDNNQLearning`.
 
     Raises
     ------
@@ -92,7 +99,13 @@ def c_header(
     True
     """
     learns = flag("learning", learning)
-    header: CHeader = writer_of(agent, require_c_name(name), fraction_bits, learns=learns).header()
+    writer = writer_of(agent, require_c_name(name), fraction_bits, learns=learns)
+    if flag("durations", durations):
+        require(learns, "durations", "be False without learning=True", durations)
+        expected = "be False for an SDNNQLearning, whose header learns usual steps alone"
+        require(not isinstance(agent, SDNNQLearning), "durations", expected, durations)
+        writer.has_durations = True
+    header: CHeader = writer.header()
     return header
 
 

@@ -139,6 +139,16 @@ class Learner(Writer[Network]):
             f"{name}_begin_episode(&agent); // whenever the task starts anew",
             *action,
             f"{name}_learn(&agent, {arguments});",
+            *self._call_over(arguments),
+        ]
+
+    def _call_over(self, arguments: str) -> list[str]:
+        """Return example lines that learn a step of another duration, where a header does."""
+        if not self.has_durations:
+            return []
+        return [
+            "// or, if the step took dt usual steps, here a constant:",
+            f"{self.name}_learn_over(&agent, {arguments}, {self.name.upper()}_DURATION(2.5));",
         ]
 
     def add_head(self, tables: Tables, end: str) -> None:

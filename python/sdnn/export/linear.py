@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from sdnn import _core
 from sdnn.environments.types import Data
 from sdnn.export.code import Code
-from sdnn.export.text import Tables, rounded_up
+from sdnn.export.text import Tables, real_number, rounded_up
 from sdnn.export.writer import Writer, require_few_weights
 
 _ONE = 1 << 16  # of rates
+_LEAST_LOGARITHM = -1e6  # of a discount of 0, which is 0 over any duration
 
 
 class LinearWriter(Writer[_core.LinearSDNN]):
@@ -81,13 +82,19 @@ class LinearWriter(Writer[_core.LinearSDNN]):
         The discount counts units of 2^-15, the decay of traces units of 2^-13.
         """
         learning, discount = self.agent.learning, round(self.agent.learning.discount * 32768)
-        return {
-            "DISCOUNT": discount,
+        usual = "USUAL_" if self.has_durations else ""
+        rule = {
+            f"{usual}DISCOUNT": discount,
             # About log2(1 / (1 - discount)): values are that many times as large as rewards.
             "HORIZON_BITS": 16 - max(32768 - discount, 1).bit_length(),
-            "TRACE_DECAY": round(learning.discount * learning.trace_decay * 8192),
+            f"{usual}TRACE_DECAY": round(learning.discount * learning.trace_decay * 8192),
             "SCHEDULE_STEPS": learning.schedule_steps,
         }
+        if self.has_durations:
+            logarithm = max(float(_core.log(learning.discount)), _LEAST_LOGARITHM)
+            rule["LOG_DISCOUNT"] = real_number(logarithm)
+            rule["LAMBDA"] = real_number(learning.trace_decay)
+        return rule
 
     def rates(self, macro: str, first: float, last: float | None) -> dict[str, int]:
         """Return a rate at the beginning and at the end of the schedule, in units of 2^-16."""
@@ -105,6 +112,11 @@ class LinearWriter(Writer[_core.LinearSDNN]):
         last = 8 * self.n_inputs + 4 * self.n_observed + self.history.episode_bytes + 1
         states = rounded_up(last, 8) + 8 * self.n_inputs + 4 * self.n_inputs * next_bins + 4
         return rounded_up(n_bytes, 8) + rounded_up(states, 8)
+
+    @property
+    def duration_bytes(self) -> int:
+        """The bytes of the factors of durations, five of two bytes, up to the next word."""
+        return 12 * self.has_durations
 
     def code_bytes(self) -> int:
         """Return the bytes of a state's code in memory."""

@@ -33,6 +33,7 @@ def new_agent(
     kind: str = "q-lambda",
     ram_bytes: int | None = None,
     approximator: NewConfig | None = None,
+    durations: bool = False,
     **options: Any,
 ) -> NewAgent:
     """Return an agent that has learned nothing, as large as the memory of a processor allows.
@@ -52,6 +53,8 @@ def new_agent(
         Linear agents, Q(lambda) and actor-critic, get as many ``n_pattern_units`` as fit, 32 to
         768, unless there is a number of them. SDNN-C gets the units given, by default those of its
         preset ``small``, or fewer if they do not fit.
+    durations : bool, optional
+        Whether its header will have them; see `c_header`.
     **options
         Other arguments of the agent's class: ``seed``, ``learning``, ``angles``, ...
 
@@ -88,7 +91,7 @@ def new_agent(
         return agent_type(observation_space, action_space, **{**settings, "approximator": size})
 
     def ram_bytes_of(size: NewConfig) -> int:
-        return c_header(make_agent(size), "agent", learning=True).ram_bytes
+        return c_header(make_agent(size), "agent", learning=True, durations=durations).ram_bytes
 
     sizes = _sizes(config)
     if len(sizes) == 1 and ram_bytes is None:

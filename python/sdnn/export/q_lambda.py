@@ -161,5 +161,6 @@ class QLambdaLearner(Learner[_core.LinearSDNN], QLambdaWriter):
         n_bytes += 4 * (2 + self.averages) * n_weights + 4 * 10  # weights, traces; 32-bit numbers
         n_bytes += 4 * 2 * self.n_dimensions  # the action, and the one that is repeated
         n_bytes = self.with_states(n_bytes, 4 * self.n_inputs, next_bins=True)
-        n_bytes += 2 * self.code_bytes() + 5 + sum(self.n_rows())  # codes, flags, flags of rows
+        n_bytes += 2 * self.code_bytes() + self.duration_bytes
+        n_bytes += 5 + sum(self.n_rows())  # flags, flags of rows
         return rounded_up(n_bytes, 8)

@@ -105,12 +105,17 @@ def header_text(
     ])  # fmt: skip
 
 
-def c_source(file: str, name: str, unused: Iterable[str] = ()) -> str:
+def c_source(file: str, name: str, unused: Sequence[str] = ()) -> str:
     """Return a C file with its includes inserted, and the prefix sdnn replaced by ``name``.
 
-    Includes of ``unused`` files, which macros exclude, are left out.
+    Left out are includes of ``unused`` files, and what is only there with these: between ``#ifdef``
+    with the macro that guards such a file and ``#endif``.
     """
-    text = re.sub(r"\bsdnn_", f"{name}_", _with_includes(file, set(unused)))
+    guards = [Path(part).stem.upper() + "_H" for part in unused]
+    text = _with_includes(file, set(unused))
+    if guards:
+        text = re.sub(rf"#ifdef ({'|'.join(guards)})\n.*?#endif\n", "", text, flags=re.DOTALL)
+    text = re.sub(r"\bsdnn_", f"{name}_", text)
     return re.sub(r"\bSDNN_", f"{name.upper()}_", text)
 
 

@@ -35,6 +35,7 @@ from sdnn.support.arguments import argument_error, whole
 _DEFAULT_FRACTION_BITS = 16
 MOST_FRACTION_BITS = 30
 _TIES = {"lowest": "LOWEST", "middle": "MIDDLE", "uniform": "DRAWN"}
+_OF_DURATIONS = ("sdnn_durations.h", "sdnn_learn_over.h")
 MOST_WEIGHTS = 2**26  # larger headers would have hundreds of megabytes
 Network = TypeVar("Network", bound=_core.SDNNC | _core.LinearSDNN)
 
@@ -73,6 +74,8 @@ class Writer(ABC, Generic[Network]):
         self.fraction_bits = self._checked_fraction_bits(fraction_bits)
 
     title: ClassVar[str] = "the greedy policy of a trained agent"
+    has_durations = False
+    """Whether the header learns transitions of unequal durations."""
 
     @property
     def network(self) -> Network:
@@ -90,7 +93,7 @@ class Writer(ABC, Generic[Network]):
 
     def unused_files(self) -> list[str]:
         """Return the C files that the header does not need."""
-        return [*self.history.unused_files]
+        return [*self.history.unused_files, *(() if self.has_durations else _OF_DURATIONS)]
 
     def history_bytes(self) -> int:
         """Return the bytes of a greedy policy's memory, on the stack and of an episode."""
@@ -196,6 +199,7 @@ class Writer(ABC, Generic[Network]):
         if not self.history.is_needed:
             conversion_tables, inputs = conversions(self.inputs, self.name, self.fraction_bits)
         flash_bytes = tables.n_bytes + conversion_tables.n_bytes + self.history.function_bytes
+        flash_bytes += 80 * self.has_durations  # coefficients of an exponential
         macro = self.name.upper()
         spaces = {
             "N_OBSERVED": self.n_observed,

@@ -26,6 +26,8 @@ def headers():
     header_by_name = {}
     for name in learners:
         header_by_name[name] = c_header(getattr(c_learners, name)(), name, learning=True)
+    for name in c_learners.TIMED:
+        header_by_name[name.replace("-", "_")] = c_learners.exported(name, name.replace("-", "_"))
     for name in ("observer", "actor-averages"):
         agent = c_learners.LEARNERS[name]()
         prefix = name.replace("-", "_")

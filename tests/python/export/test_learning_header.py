@@ -19,6 +19,7 @@ from c_learners import (
     build,
     check_learning,
     discrete,
+    exported,
     lies_between,
     lines_of,
     network,
@@ -300,7 +301,7 @@ def test_the_learner_class_of_cpp_acts_learns_saves_and_loads(compiler, make, ac
 
 @pytest.mark.parametrize("name", LEARNERS)
 def test_the_header_states_the_size_of_the_agent_in_memory(name, target, tmp_path):
-    header = c_header(LEARNERS[name](), "agent", learning=True)
+    header = exported(name)
     (tmp_path / "agent.h").write_text(header.text)
     source = '#include "agent.h"\n#include <stdio.h>\nint main(void)'
     source += ' { printf("%d %d", (int)sizeof(agent_agent), (int)AGENT_KEPT_BYTES); return 0; }'

@@ -19,7 +19,7 @@ from sdnn.agents import (
     Transition,
 )
 from sdnn.approximators import LinearSDNNConfig, SDNNCConfig
-from sdnn.export import export_c_header, load_image, save_image
+from sdnn.export import c_header, export_c_header, load_image, save_image
 
 SMALL = LinearSDNNConfig(n_pattern_units=24, averaging_interval=7)
 NETWORK = SDNNCConfig(
@@ -163,8 +163,14 @@ ACTORS = {
     "actor": actor, "actor-vector": actor_vector, "actor-discrete": actor_discrete,
     "actor-states": actor_states,
 }  # fmt: skip
+TIMED = {
+    "timed-discrete": discrete, "timed-sarsa": sarsa, "timed-dutch": dutch,
+    "timed-actor": actor_vector,
+}  # fmt: skip
+"""Agents whose transitions have durations."""
 LEARNERS = {
     **NETWORKS,
+    **TIMED,
     **ACTORS,
     **HISTORIES,
     "states": states,
@@ -181,7 +187,7 @@ def _ranges(*sizes):
 
 
 # A line of input: what to do (0: begin an episode, 1: act and learn, 2: act greedily, 3: in another
-# episode), observation, reward, next observation, whether it terminated.
+# episode), observation, reward, next observation, whether it terminated, plus twice the duration.
 DRIVER = """
 #include <stdio.h>
 #include "agent.h"
@@ -247,6 +253,20 @@ def lines_of(agent, n_steps, seed, fraction_bits):
     if has_episodes(agent):
         table = with_greedy_episodes(table, random)
     return table.astype("<i4")
+
+
+def with_durations(lines, random):
+    """Lines of steps with durations of all sizes, some after a refused attempt with a short one."""
+    n_attempts = (lines[:, 0] == 1) & (random.random(len(lines)) < 0.1)
+    attempts = np.repeat(np.arange(len(lines)), n_attempts)
+    lines = np.insert(lines, attempts, lines[attempts], axis=0)
+    durations = np.exp2(random.uniform(6.1, 24.0, len(lines))).astype(np.int64)
+    near = random.integers(66, 72, len(lines)), random.integers(60000, 70000, len(lines))
+    durations = np.choose(random.integers(0, 5, len(lines)), [65536, *near, durations, 2**30 - 1])
+    refused = attempts + np.arange(attempts.size)
+    durations[refused] = random.integers(1, 66, attempts.size)
+    lines[:, -1] += (2 * durations).astype("<i4")
+    return lines
 
 
 def has_episodes(agent):
@@ -338,16 +358,22 @@ def run_agent(agent, lines, fraction_bits):
         actions.append(indices)
         is_refused = agent.missing == "error" and np.isnan(following).any()
         if line[0] == 1 and not is_refused:
-            agent.learn(Transition(now, action, line[n + 1] / scale, following, bool(line[-1])))
+            terminated, dt = line[-1] % 2 == 1, line[-1] // 2 / 2**16 or 1.0
+            step = Transition(now, action, line[n + 1] / scale, following, terminated, dt=dt)
+            if dt >= 0.001:
+                agent.learn(step)
+                continue
+            with pytest.raises(ValueError, match="dt"):
+                agent.learn(step)
     agent.begin_episode()
     state = agent._state_of("agent") | {name: generator}
     agent._restore(agent=state, reward_scale=agent._state_of("reward_scale"))
     return actions
 
 
-def build(folder, agent, target, *options):
+def build(folder, agent, target, *options, durations=False):
     """The header and its program, as a command."""
-    header = export_c_header(agent, folder / "agent.h", learning=True)
+    header = export_c_header(agent, folder / "agent.h", learning=True, durations=durations)
     one = agent.n_dimensions == 1
     has_history = has_episodes(agent)
     function = "agent_place" if lies_between(agent) else "agent_greedy"
@@ -358,6 +384,11 @@ def build(folder, agent, target, *options):
         f"agent_learn(&agent, line + 1, {'action[0]' if one else 'action'},"
         " line[1 + AGENT_N_OBSERVED], next, line[2 * AGENT_N_OBSERVED + 2])"
     )
+    if durations:
+        ends = "line[2 * AGENT_N_OBSERVED + 2]"
+        learn = learn.replace("learn(", "learn_over(").replace(
+            f"{ends})", f"{ends} & 1, (uint32_t){ends} >> 1)"
+        )
     begin = "agent_begin_greedy_episode(&agent, &episode)" if has_history else "(void)0"
     memory = "static agent_greedy_episode episode;" if has_history else ""
     source = DRIVER.replace("ACT;", f"{act};").replace("LEARN", learn)
@@ -379,11 +410,22 @@ def run_program(command, image, lines, n_dimensions):
     return np.frombuffer(done[:n], "<u4").reshape(-1, n_dimensions).tolist(), done[n:]
 
 
+def exported(name, prefix="agent"):
+    """The header of a learner."""
+    return c_header(LEARNERS[name](), prefix, learning=True, durations=name in TIMED)
+
+
+def timed_lines_of(name, agent, n_steps, seed, fraction_bits):
+    """Lines of a learner, with durations where it learns them."""
+    lines = lines_of(agent, n_steps, seed, fraction_bits)
+    return with_durations(lines, np.random.default_rng(seed)) if name in TIMED else lines
+
+
 @functools.cache
 def recorded_steps(name, n_steps, fraction_bits):
     """Lines, the first image of the library's agent, its actions and its last image."""
     agent = LEARNERS[name]()
-    lines = lines_of(agent, n_steps, 1, fraction_bits)
+    lines = timed_lines_of(name, agent, n_steps, 1, fraction_bits)
     initial_image = save_image(agent)
     return lines, initial_image, run_agent(agent, lines, fraction_bits), save_image(agent)
 
@@ -391,7 +433,7 @@ def recorded_steps(name, n_steps, fraction_bits):
 def check_learning(name, target, folder, n_steps=3000, options=()):
     """Check that a program acts and learns like the agent, from the header and from an image."""
     agent = LEARNERS[name]()
-    header, command = build(folder, agent, target, *options)
+    header, command = build(folder, agent, target, *options, durations=name in TIMED)
     lines, initial_image, expected, last_image = recorded_steps(name, n_steps, header.fraction_bits)
     actions, image = run_program(command, initial_image, lines, agent.n_dimensions)
     assert actions == expected
@@ -399,7 +441,8 @@ def check_learning(name, target, folder, n_steps=3000, options=()):
     # Python loads the experience, and both continue from it.
     load_image(agent, image)
     assert save_image(agent) == image
-    later_lines = lines_of(agent, min(n_steps, 3000) // 10, 2, header.fraction_bits)
+    n_later = min(n_steps, 3000) // 10
+    later_lines = timed_lines_of(name, agent, n_later, 2, header.fraction_bits)
     actions, image = run_program(command, image, later_lines, agent.n_dimensions)
     assert actions == run_agent(agent, later_lines, header.fraction_bits)
     assert image == save_image(agent)

@@ -201,6 +201,7 @@ GOOD = {
     "executor": lambda: None,
     "experiment": lambda: EXPERIMENTS[0],
     "flash_bytes": lambda: None,
+    "durations": lambda: False,
     "fraction_bits": lambda: None,
     "image": lambda: save_image(tiny_agent()),
     "jobs": lambda: 1,
