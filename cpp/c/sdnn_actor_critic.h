@@ -12,6 +12,7 @@
 #include "sdnn_thermometers.h"
 #ifdef SDNN_HISTORY
 #include "sdnn_history_learner.h"
+#include "sdnn_running_ranges.h"
 #elif defined(SDNN_HOLDS)
 #include "sdnn_held_observations.h"
 #elif defined(SDNN_CODES)
@@ -326,6 +327,10 @@ static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observat
 }
 
 #define SDNN_IMAGE_HEAD 120
+#ifdef SDNN_RUNNING_RANGES_H
+#undef SDNN_IMAGE_HEAD
+#define SDNN_IMAGE_HEAD (120 + SDNN_RANGES_BYTES)
+#endif
 #define SDNN_IMAGE_BYTES (SDNN_IMAGE_HEAD + 4 * SDNN_N_ALL_WEIGHTS + 4)
 
 /* Reads the head of an image, or writes it. */
@@ -342,6 +347,9 @@ static inline void sdnn_carry_head(sdnn_agent* agent, uint8_t* image, int reads)
   at = sdnn_carry_64(at, &agent->n_learned, 1, reads);
   at = sdnn_carry_scale(at, &agent->scale, reads);
   sdnn_carry_64(at, agent->randoms, 4 * SDNN_N_RANDOMS, reads);
+#ifdef SDNN_RUNNING_RANGES_H
+  sdnn_carry_ranges(image + 120, &agent->states.ranges, reads);
+#endif
 }
 
 /* Makes an agent with the head of an image, without weights. */
@@ -361,6 +369,9 @@ static inline int sdnn_is_exponent(int32_t exponent) {
 /* Whether a head, which may be damaged, has possible numbers at the offsets of sdnn_carry_head. */
 static inline int sdnn_is_head(const uint8_t* head) {
   const int32_t exponent = sdnn_get_32(head + 8);
+#ifdef SDNN_RUNNING_RANGES_H
+  if (!sdnn_are_ranges(head + 120)) return 0;
+#endif
   return sdnn_are_generators(head + 56) && (exponent == INT32_MIN || sdnn_is_exponent(exponent)) &&
          sdnn_is_exponent(sdnn_get_32(head + 12)) && sdnn_get(head + 16, 4) <= 1024 &&
          sdnn_get(head + 20, 8) <= UINT64_C(1) << 60 &&

@@ -56,8 +56,8 @@ _LARGEST = 2**31  # limit of the ranges of observations and actions
     "--learning",
     is_flag=True,
     help="The header has the agent itself, which continues to learn. For the agents q-lambda,"
-    " actor-critic with an observation_range that is not running, and sdnn-c with"
-    " approximator.averaging_interval=0 and approximator.weight_limit=127.",
+    " actor-critic, and sdnn-c with approximator.averaging_interval=0 and"
+    " approximator.weight_limit=127.",
 )
 @click.option(
     "--durations",
@@ -73,10 +73,11 @@ _LARGEST = 2**31  # limit of the ranges of observations and actions
 @click.option(
     "--range",
     "ranges",
-    metavar="LOW:HIGH|angle",
+    metavar="LOW:HIGH|angle|running",
     multiple=True,
     help="With --new: range of a sensor's values; repeat it for each sensor, in their order."
-    " angle: in radians, from -pi to pi, which are the same.",
+    " angle: in radians, from -pi to pi, which are the same. running: for an actor-critic, follows"
+    " the readings, as for all sensors that are no angles.",
 )
 @click.option(
     "--actions",
@@ -317,9 +318,14 @@ def _new_agent(
     from sdnn.export.new import new_settings
     from sdnn.runs.settings import with_changes
 
-    bounds = [
-        (-math.pi, math.pi) if text == "angle" else _bounds_in("--range", text) for text in ranges
-    ]
+    is_running = "running" in ranges
+    if is_running and not {*ranges} <= {"running", "angle"}:
+        raise click.UsageError("--range running must be that of all sensors that are no angles")
+    if is_running and kind != "actor-critic":
+        raise click.UsageError("--range running needs --agent actor-critic: state LOW:HIGH")
+    more: dict[str, Any] = {"observation_range": "running"} if is_running else {}
+    words = {"angle": (-math.pi, math.pi), "running": (-1.0, 1.0)}
+    bounds = [words[text] if text in words else _bounds_in("--range", text) for text in ranges]
     tables: dict[str, dict[str, object]] = {"approximator": {}, "learning": {}}
     for name, text in named_values("--set", settings):
         table, _, key = name.partition(".")
@@ -339,6 +345,7 @@ def _new_agent(
             seed=seed or 0,
             missing=missing or "error",
             durations=durations,
+            **more,
             angles=[i for i, text in enumerate(ranges) if text == "angle"],
             **parts,
         )
@@ -379,7 +386,7 @@ def _bounds_in(option: str, text: str) -> tuple[float, float]:
     except ValueError:
         bounds = math.nan, math.nan
     if not -_LARGEST < bounds[0] < bounds[1] < _LARGEST:
-        word = " or angle" if option == "--range" else ""
+        word = ", angle or running" if option == "--range" else ""
         raise click.UsageError(
             f"{option} must be LOW:HIGH{word}, LOW below HIGH and both within 2^31, got {text!r}"
         )

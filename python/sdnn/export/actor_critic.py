@@ -11,10 +11,10 @@ from sdnn import _core
 from sdnn.agents import SDNNActorCritic
 from sdnn.environments.types import Array, Data
 from sdnn.export.code import Code
-from sdnn.export.learner import NONE, SCALE_FIELDS, Field, Learner
+from sdnn.export.learner import MOMENTS, NONE, SCALE_FIELDS, Field, Learner
 from sdnn.export.linear import LinearWriter
 from sdnn.export.text import Tables, rounded_up
-from sdnn.export.writer import CHeader
+from sdnn.export.writer import CHeader, follows_ranges
 
 _CRITIC, _ACTOR = "action_value.weights", "actor.weights"
 
@@ -164,6 +164,10 @@ class ActorCriticLearner(Learner[_core.LinearSDNN], ActorCriticWriter):
     streams = ("exploration", "ties")
     n_critic_rows = 1
 
+    def __init__(self, agent: SDNNActorCritic, name: str, fraction_bits: int | None) -> None:
+        super().__init__(agent, name, fraction_bits)
+        self.history.follows_ranges = follows_ranges(agent)
+
     def fields(self) -> list[Field]:
         """Return the fields of an image: names, types and shapes."""
         shape = self.n_critic_rows + sum(self.n_rows()), self.code().n_columns
@@ -175,12 +179,20 @@ class ActorCriticLearner(Learner[_core.LinearSDNN], ActorCriticWriter):
             ("n_learned", "<u8"),
             *SCALE_FIELDS,
             ("words", "<u8", (2, 4)),
+            *self._moments(),
             ("weights", "<i4", shape),
         ]
 
     def remembered(self, state: Data) -> Data:
         """Return the fields that are not the same in the core's state."""
-        return {"action_value.exponent": NONE, **state, "weights": self.weights(state)}
+        moments = self.agent._state_of("observations") if self._moments() else {}
+        return {"action_value.exponent": NONE, **state, **moments, "weights": self.weights(state)}
+
+    def _moments(self) -> list[Field]:
+        """Return the fields of running ranges."""
+        if not self.history.follows_ranges:
+            return []
+        return [(f"running.{name}", c, (self.n_observed,)) for name, c in MOMENTS.items()]
 
     def recall(self, image: Array, state: Data) -> None:
         """Put the fields of an image into the core's state; the episode before is over."""
@@ -219,7 +231,7 @@ class ActorCriticLearner(Learner[_core.LinearSDNN], ActorCriticWriter):
         weights = self.weights(state)
         first_weights = weights.reshape(-1) if weights.any() else np.zeros(0, np.int32)
         tables.add("int32_t", "first_weights", first_weights)
-        if not self.history.has_episodes and not self.codes_missing:
+        if not self.history.has_episodes and not self.codes_missing and not self._moments():
             self.add_limits(tables)
         defines = {
             **self.defines(),

@@ -13,7 +13,7 @@ from sdnn.export.actor_critic import ActorCriticLearner, ActorCriticWriter
 from sdnn.export.q_lambda import QLambdaLearner, QLambdaWriter
 from sdnn.export.sdnn_c import SDNNCLearner, SDNNCWriter
 from sdnn.export.text import require_c_name, write_header
-from sdnn.export.writer import CHeader
+from sdnn.export.writer import CHeader, follows_ranges
 from sdnn.support.arguments import flag, require, shown
 
 
@@ -61,7 +61,8 @@ def c_header(
     Parameters
     ----------
     agent : SDNNQLearning, SDNNQLambda or SDNNActorCritic
-        With known ranges of its observations.
+        With known ranges of its observations. Running ranges stay as they are, but in an
+        `SDNNActorCritic` that learns.
     name : str
         Prefix of all names in the header.
     fraction_bits : int, optional
@@ -119,11 +120,14 @@ def writer_of(agent: Any, name: str, fraction_bits: int | None, *, learns: bool)
     expected = "have history='none', as SDNNQLambda and SDNNActorCritic alone have a history in C"
     is_possible = not has_history or isinstance(agent, SDNNQLambda | SDNNActorCritic)
     require(is_possible, "agent", expected, agent)
-    expected = (
-        "have ranges of observations that stay, not running ones, to learn in C: make it with"
-        " observation_range=(low, high), or sdnn train --range LOW:HIGH"
-    )
-    require(not (learns and _follows_ranges(agent)), "agent", expected, agent)
+    if learns and follows_ranges(agent):
+        expected = (
+            "have ranges of observations that stay, not running ones, to learn in C, unless it is"
+            " an SDNNActorCritic with history='none' and missing='error': make it with"
+            " observation_range=(low, high), or sdnn train --range LOW:HIGH"
+        )
+        is_possible = isinstance(agent, SDNNActorCritic) and agent.missing == "error"
+        require(is_possible and not has_history, "agent", expected, agent)
     expected = (
         "have learned without action masks, which no C header has: it would take actions that are"
         " not allowed. Train without masks, with a reward that punishes such actions"
@@ -139,13 +143,6 @@ def writer_of(agent: Any, name: str, fraction_bits: int | None, *, learns: bool)
         return (ActorCriticLearner if learns else ActorCriticWriter)(agent, name, fraction_bits)
     expected = "an SDNNQLearning, SDNNQLambda or SDNNActorCritic"
     raise TypeError(f"agent must be {expected}, got {shown(agent)}")
-
-
-def _follows_ranges(agent: Any) -> bool:
-    """Return whether ranges of an agent's inputs are adapted to each new observation."""
-    if not getattr(agent, "has_running_ranges", False):
-        return False
-    return agent.is_warming_up or any(kind == "variable" for kind, _ in agent.inputs)
 
 
 def save_image(agent: SDNNQLearning | SDNNQLambda | SDNNActorCritic) -> bytes:

@@ -14,6 +14,7 @@ from sdnn.export.text import Input, Tables, bits_of, real_number, rounded_up
 
 _OF_HISTORY = ("sdnn_history.h", "sdnn_history_learner.h")
 _SINGLE = ("sdnn_single_observations.h", "sdnn_last_bins.h", "sdnn_last_observation.h")
+_RUNNING = "sdnn_running_ranges.h"
 _OF_HELD = ("sdnn_readings.h", "sdnn_held_observations.h")
 _DIGITS = {"float64": (53, -1074), "float32": (24, -149), "float16": (11, -24), "whole": (0, 0)}
 """Binary digits of the numbers of a Box, and the exponent of their least bit; 0: whole numbers."""
@@ -36,6 +37,13 @@ class StateHistory:
         self.numbers = [i for i, source in enumerate(inputs) if source.kind != "symbol"]
         self.holds = agent.missing == "hold"
         """Whether the last readings replace those that are missing."""
+        self.follows_ranges = False
+        """Whether ranges follow the observations from which the header learns."""
+
+    @property
+    def has_real_inputs(self) -> bool:
+        """Whether the header calculates inputs as real numbers, and not their bins alone."""
+        return self.is_needed or self.follows_ranges
 
     @property
     def is_needed(self) -> bool:
@@ -51,9 +59,12 @@ class StateHistory:
     def unused_files(self) -> Sequence[str]:
         """The C files that its header does not need."""
         without = ["sdnn_policy.h" if self.has_episodes else "sdnn_episode_policy.h"]
-        if self.has_episodes:
+        if self.has_episodes or self.follows_ranges:
             without += _SINGLE
-        without += ["sdnn_float_bins.h"] if self.is_needed else _OF_HISTORY
+        if not self.follows_ranges:
+            without.append(_RUNNING)
+        without += ["sdnn_float_bins.h"] if self.has_real_inputs else ()
+        without += () if self.is_needed else _OF_HISTORY
         return [*without, *(() if self.holds and not self.is_needed else _OF_HELD)]
 
     @property
@@ -94,7 +105,8 @@ class StateHistory:
         An input of kind "angle" is atan2 of two readings. An observer also takes sine and cosine of
         these, and of readings that are angles themselves ("circular").
         """
-        kinds = {source.kind for source in self.inputs} if self.is_needed else set[str]()
+        has_kinds = self.has_real_inputs
+        kinds = {source.kind for source in self.inputs} if has_kinds else set[str]()
         n_numbers = 23 if "angle" in kinds else 0  # coefficients of atan2
         if self.kind == "observer" and kinds & {"angle", "circular"}:
             n_numbers += 12  # coefficients of sine and cosine
@@ -114,6 +126,8 @@ class StateHistory:
         sizes: Data = {}
         if self.holds:
             sizes |= {"HOLDS": 1, "N_PARTS": len(self._part_sizes())}
+        if self.follows_ranges:
+            sizes["HISTORY"] = 0  # none, but states are real numbers
         if not self.is_needed:
             return sizes
         sizes |= {
@@ -221,4 +235,6 @@ class StateHistory:
         if source.kind == "symbol":
             return f"SYMBOL({i}, {first}, {source.n_bins})"
         low, width = map(real_number, (source.low, source.high - source.low))
+        if self.follows_ranges and source.kind == "variable":
+            low, width = f"ranges->low[{first}]", f"ranges->width[{first}]"
         return f"{source.kind.upper()}({i}, {first}, {low}, {width})"

@@ -26,6 +26,8 @@ SCALE_FIELDS = [
     (f"{SCALE}.size_in_window", "<i4"),
     (f"{SCALE}.headroom", "<i4"),
 ]
+MOMENTS = {"counts": "<u8", "means": "<f8", "squares": "<f8"}
+"""Names and types of the moments of running ranges."""
 Field: TypeAlias = tuple[str, str] | tuple[str, str, tuple[int, ...]]
 """Name and type of a field of an image, and its shape."""
 
@@ -90,7 +92,23 @@ class Learner(Writer[Network]):
         names = [name for name in fields if name.startswith(SCALE)]
         known = {name: np.array(image[name]) for name in names if image[name] != NONE}
         scale = {name.removeprefix(f"{SCALE}."): number for name, number in known.items()}
-        self.agent._restore(agent=state, reward_scale=scale)
+        parts = {"agent": state, "reward_scale": scale}
+        if self.history.follows_ranges:
+            parts["observations"] = self._observations_of(image)
+        self.agent._restore(**parts)
+
+    def _observations_of(self, image: Array) -> Data:
+        """Return the core's state of running ranges, with the moments of an image."""
+        counts, means, squares = (image[f"running.{name}"].copy() for name in MOMENTS)
+        state = self.agent._state_of("observations")
+        if "low" in state:  # where a warm-up found the inputs, the ranges are listed too
+            deviations = np.sqrt(squares / np.maximum(counts - 1.0, 1.0))
+            deviations[counts < 2] = 1.0
+            ends = 2.5 * np.maximum(deviations, np.maximum(1e-6 * np.abs(means), 1e-140))
+            at = [source.at[0] for source in self.inputs if source.kind == "variable"]
+            state["low"][at], state["high"][at] = (means - ends)[at], (means + ends)[at]
+        moments = (counts.astype(np.int64), means, squares)
+        return state | {f"running.{name}": m for name, m in zip(MOMENTS, moments, strict=True)}
 
     def tie_rule(self) -> str:
         """Return how the agent breaks ties."""
@@ -196,10 +214,12 @@ class Learner(Writer[Network]):
     ) -> list[str]:
         """Return comment lines about memory.
 
-        ``kilobytes`` of code are those without a history, of which 3 are for storing and keeping;
+        ``kilobytes`` of code are those without a history, running ranges or durations, of which 3
+        are for storing and keeping;
         ``n_policy_words`` are the 32-bit words of the policy that is kept.
         """
         kilobytes += 3 * self.history.is_needed
+        kilobytes += 2 * (self.history.follows_ranges + self.has_durations)
         kept_bytes = rounded_up(4 * (n_policy_words + _N_RECORD_WORDS), _PART_BYTES)
         return [
             f"Flash: {{flash}} bytes of constants; the code comes to some {kilobytes} kB.",

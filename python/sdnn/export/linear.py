@@ -104,8 +104,12 @@ class LinearWriter(Writer[_core.LinearSDNN]):
     def with_states(self, n_bytes: int, plain_bytes: int, *, next_bins: bool) -> int:
         """Add the bytes of the last states, with their history, to those of the fields before them.
 
-        Without a history they have ``plain_bytes``; with one they begin at a multiple of 8 bytes.
+        Without a history they have ``plain_bytes``; with one, or running ranges, they begin at a
+        multiple of 8 bytes.
         """
+        if self.history.follows_ranges:
+            states = 16 * self.n_inputs + (5 * 8 + 4) * self.n_observed + 2
+            return rounded_up(n_bytes, 8) + rounded_up(states, 8)
         if not self.history.is_needed:
             n_readings = self.n_observed + 1 + self.n_observed * next_bins
             return n_bytes + 4 * n_readings * self.history.holds + plain_bytes

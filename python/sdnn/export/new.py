@@ -44,7 +44,8 @@ def new_agent(
     Parameters
     ----------
     observation_space, action_space
-        See `Agent`. Every range must be finite, or given as ``observation_range``.
+        See `Agent`. Every range must be finite, or given as ``observation_range``; for
+        ``"actor-critic"`` that may be ``"running"``.
     kind : {"q-lambda", "actor-critic", "sdnn-c"}
     ram_bytes : int, optional
         Most bytes that the agent may take in C; by default 20,000, or 60,000 for ``"sdnn-c"``, and
@@ -79,7 +80,7 @@ def new_agent(
     is_running = agent_type.presets[agent_type.default_preset].observation_range == "running"
     if is_running and isinstance(observation_space, gym.spaces.Box):
         bounds = observation_space.low.reshape(-1), observation_space.high.reshape(-1)
-        settings.setdefault("observation_range", bounds)  # in C ranges stay
+        settings.setdefault("observation_range", bounds)  # these need less memory
     config = settings["approximator"] if approximator is None else approximator
     if not isinstance(config, agent_type.approximator_type):
         expected = agent_type.approximator_type.__name__

@@ -283,8 +283,8 @@ class Input:
     high: float
     n_bins: int
 
-    def usage(self, number: int) -> Iterator[str]:
-        """Describe the input to a reader of the header."""
+    def usage(self, number: int, *, is_running: bool) -> Iterator[str]:
+        """Describe the input to a reader of the header, whose ranges may be running ones."""
         first = self.at[0]
         if self.kind == "angle":
             yield f"  input {number}: the angle of cosine observation[{first}] and sine"
@@ -292,6 +292,9 @@ class Input:
         elif self.kind == "symbol":
             last = first + self.n_bins - 1
             yield f"  input {number}: which of observation[{first}] to observation[{last}] is 1"
+        elif is_running and self.kind == "variable":
+            yield f"  input {number}: observation[{first}] in {self.n_bins} bins of a range that"
+            yield "    follows its readings"
         else:
             turn = ", an angle," if self.kind == "circular" else ""
             bounds = f"from {self.low:.6g} to {self.high:.6g} in {self.n_bins} bins"

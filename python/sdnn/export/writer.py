@@ -171,7 +171,7 @@ class Writer(ABC, Generic[Network]):
             self.agent.seed,
             self.n_actions(),
             [
-                (source.kind, list(source.at), source.low, source.high, source.n_bins)
+                (source.kind, list(source.at), *self._fixed_range(source), source.n_bins)
                 for source in self.inputs
             ],
             [zlib.crc32(self.network.permutation(*pair).tobytes()) for pair in self.network.pairs],
@@ -181,6 +181,11 @@ class Writer(ABC, Generic[Network]):
         if self.agent.missing != "error":
             about.append(self.agent.missing)
         return zlib.crc32(json.dumps(about).encode())
+
+    def _fixed_range(self, source: Input) -> tuple[float, float] | tuple[()]:
+        """Return the range of an input, unless it follows what is observed."""
+        is_running = self.history.follows_ranges and source.kind == "variable"
+        return () if is_running else (source.low, source.high)
 
     def write(
         self,
@@ -196,7 +201,7 @@ class Writer(ABC, Generic[Network]):
         ``needs`` are lines about memory, and ``sizes`` the other attributes of the `CHeader`.
         """
         conversion_tables, inputs = Tables(self.name), self.history.calls()
-        if not self.history.is_needed:
+        if not self.history.has_real_inputs:
             conversion_tables, inputs = conversions(self.inputs, self.name, self.fraction_bits)
         flash_bytes = tables.n_bytes + conversion_tables.n_bytes + self.history.function_bytes
         flash_bytes += 80 * self.has_durations  # coefficients of an exponential
@@ -266,7 +271,11 @@ class Writer(ABC, Generic[Network]):
             *(f"  {line}" for line in self.calls()),
             "",
             f"An action is a number; {self._action_value()} is its value.",
-            *(line for i, source in enumerate(self.inputs) for line in source.usage(i)),
+            *(
+                line
+                for i, source in enumerate(self.inputs)
+                for line in source.usage(i, is_running=self.history.follows_ranges)
+            ),
             *self.history.usage(),
             *self._missing_remark(),
             *self.tie_remark(),
@@ -330,6 +339,13 @@ class Writer(ABC, Generic[Network]):
         }[rule]
         agent = "as the agent does" if rule == agent_rule else "where the agent draws one"
         return [f"Of several best actions it takes {choice}, {agent}."]
+
+
+def follows_ranges(agent: Any) -> bool:
+    """Return whether ranges of an agent's inputs are adapted to each new observation."""
+    if not getattr(agent, "has_running_ranges", False):
+        return False
+    return agent.is_warming_up or any(kind == "variable" for kind, _ in agent.inputs)
 
 
 def require_few_weights(n_weights: int, settings: str) -> None:

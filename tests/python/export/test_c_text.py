@@ -23,6 +23,7 @@ COMPILERS = {
 def headers():
     """A header of each kind, by name."""
     learners = ("network", "paper_rule", "actor_vector", "dutch", "several", "states")
+    learners += ("actor_running",)
     header_by_name = {}
     for name in learners:
         header_by_name[name] = c_header(getattr(c_learners, name)(), name, learning=True)

@@ -15,6 +15,7 @@ from c_learners import (
     SMALL,
     actor,
     actor_discrete,
+    actor_running,
     actor_vector,
     build,
     check_learning,
@@ -52,7 +53,7 @@ def test_an_exported_agent_acts_and_learns_bit_for_bit_as_in_python(name, target
     check_learning(name, target, tmp_path, options=SANITIZED)
 
 
-@pytest.mark.parametrize("make", [discrete, network, small_steps, actor])
+@pytest.mark.parametrize("make", [discrete, network, small_steps, actor, actor_running])
 def test_a_trained_agent_continues_in_c(make, target, tmp_path):
     agent = make()
     run_agent(agent, lines_of(agent, 500, 3, 16), 16)
@@ -98,7 +99,7 @@ def test_an_endless_episode_in_c_has_the_excursions_of_the_agent(target, tmp_pat
 
 def test_extreme_readings_and_rewards_have_defined_results(target, tmp_path):
     # Half of the numbers are extreme; acting, learning and new episodes come in any order.
-    for make in (discrete, sarsa, network, small_steps, actor):
+    for make in (discrete, sarsa, network, small_steps, actor, actor_running):
         folder = tmp_path / make.__name__
         folder.mkdir()
         agent = make()
@@ -149,7 +150,7 @@ int main(void) {
 """
 
 
-@pytest.mark.parametrize("make", [discrete, sarsa, network, small_steps, actor])
+@pytest.mark.parametrize("make", [discrete, sarsa, network, small_steps, actor, actor_running])
 def test_images_with_extreme_numbers_are_refused_or_saved_again(make, target, tmp_path):
     # The program fails if it cannot load an image that it saved.
     agent = make()

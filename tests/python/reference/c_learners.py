@@ -150,6 +150,20 @@ def actor_discrete():
     return SDNNActorCritic(*spaces, seed=13, learning=learning, **settings)
 
 
+def actor_running():
+    """An actor-critic with running ranges, an angle of two readings, and torques."""
+    settings = _with(replace(SMALL, n_actions=5)) | {"angle_pairs": [(1, 2)]}
+    return SDNNActorCritic(box(3.0, 1.0, 1.0, 0.1), box(2.0), seed=15, **settings)
+
+
+def actor_running_discrete():
+    """An actor-critic with a running range beside a circular angle, and discrete actions."""
+    learning = ActorCriticConfig(thermometers=False)
+    settings = {"approximator": SMALL, "inputs": "all", "angles": [0], "learning": learning}
+    spaces = box(np.pi, 2.0), gym.spaces.MultiDiscrete([3, 2])
+    return SDNNActorCritic(*spaces, seed=16, **settings)
+
+
 def actor_states():
     """An actor-critic with a table of listed states."""
     return SDNNActorCritic(gym.spaces.Discrete(9), gym.spaces.Discrete(4, start=2), seed=14)
@@ -161,7 +175,8 @@ NETWORKS = {
 }  # fmt: skip
 ACTORS = {
     "actor": actor, "actor-vector": actor_vector, "actor-discrete": actor_discrete,
-    "actor-states": actor_states,
+    "actor-states": actor_states, "actor-running": actor_running,
+    "actor-running-discrete": actor_running_discrete,
 }  # fmt: skip
 TIMED = {
     "timed-discrete": discrete, "timed-sarsa": sarsa, "timed-dutch": dutch,
