@@ -7,17 +7,8 @@ import numpy as np
 import pytest
 
 from c_histories import warmed_up
-from c_learners import (
-    MISSING,
-    NETWORK,
-    SMALL,
-    build,
-    lies_between,
-    lines_of,
-    run_agent,
-    run_program,
-    with_missing,
-)
+from c_learners import NETWORK, SMALL, build, lies_between, run_agent, run_program
+from c_lines import MISSING, lines_of, with_missing
 from c_policies import SANITIZED, STRICT, STRICT_CPP, box, place_of, program, run
 from refusals import refuses
 from sdnn.agents import QLambdaConfig, SDNNActorCritic, SDNNQLambda, SDNNQLearning
