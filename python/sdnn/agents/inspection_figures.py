@@ -66,8 +66,7 @@ def draw_map(
     n_panels = 1 + n_dimensions
     inches = (NARROW_WIDTH, 3.7 * n_panels) if narrow else (min(4.6 * n_panels, 14.0), 3.7)
     figure = new_figure(*inches)
-    shape = (n_panels, 1) if narrow else (1, n_panels)
-    panels = figure.subplots(*shape, squeeze=False).ravel()
+    panels = figure.subplots(*((n_panels, 1) if narrow else (1, n_panels)), squeeze=False).ravel()
     draw_values(panels[0], value_name, state_map, states)
     for d in range(n_dimensions):
         draw_policy(panels[1 + d], agent, state_map, states, d)
@@ -83,8 +82,7 @@ def draw_values(axes: Axes, value_name: str, state_map: StateMap, states: Floats
         axes.plot(x, state_map.values, line, color=color_of(0), linewidth=1.5, markersize=4)
         _finish_curve(axes, state_map, states)
         return
-    mesh = _draw_mesh(axes, state_map, state_map.values, "viridis")
-    _colorbar(axes, mesh)
+    _colorbar(axes, _draw_mesh(axes, state_map, state_map.values, "viridis"))
     _draw_states(axes, state_map, states)
 
 
@@ -126,8 +124,7 @@ def draw_policy(
         limits = None
         if isinstance(space, gym.spaces.Box):
             limits = float(np.ravel(space.low)[dimension]), float(np.ravel(space.high)[dimension])
-        mesh = _draw_mesh(axes, state_map, actions, "RdBu_r", limits)
-        _colorbar(axes, mesh)
+        _colorbar(axes, _draw_mesh(axes, state_map, actions, "RdBu_r", limits))
     _draw_states(axes, state_map, states)
 
 
@@ -342,5 +339,4 @@ def plot_policy(
 def plot_inputs(agent: AnyAgent, source: Env | Elements, seed: int) -> Figure:
     """Draw the influence of each input; see `Agent.plot_inputs`."""
     inputs = inputs_of(agent)
-    states = states_of(agent, source, seed)
-    return draw_influences(influences(Reader(agent), states, inputs, seed))
+    return draw_influences(influences(Reader(agent), states_of(agent, source, seed), inputs, seed))

@@ -47,8 +47,7 @@ def _options() -> list[click.Option]:
         schema: dict[str, Any] = {"$ref": "RunSpec"}
         for name in key.split("."):
             alternatives = (schema, *schema.get("anyOf", ()))  # `anyOf`: a table that may be null
-            reference = next(part["$ref"] for part in alternatives if "$ref" in part)
-            table = reference.rpartition("/")[2]
+            table = next(part["$ref"] for part in alternatives if "$ref" in part).rpartition("/")[2]
             schema = schemas[table]["properties"][name]
         types = (part for part in schema.get("anyOf", ()) if part.get("type") != "null")
         kind = next(types, schema)
@@ -163,8 +162,7 @@ def train(
             raise click.UsageError(
                 f"--out: {folder} holds a run already: {resume_command(folder)} continues it"
             )
-        run = Run.create(folder, spec)
-        train_run(run, as_json)
+        train_run(Run.create(folder, spec), as_json)
 
 
 def _options_by_key(env_id: str | None, options: Options) -> Options:

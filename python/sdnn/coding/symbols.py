@@ -242,8 +242,7 @@ class WithMissing(Coding):
 
     def patterns(self, n_units: int, seed: int) -> NDArray[np.int8]:
         """Return the patterns of the base coding, then that of missing values."""
-        sequence = np.random.SeedSequence(seed_of(seed))
-        seed_of_missing = int(sequence.generate_state(1, np.uint64)[0])
+        seed_of_missing = int(np.random.SeedSequence(seed_of(seed)).generate_state(1, np.uint64)[0])
         missing = _core.symbol_patterns(1, n_units, seed_of_missing)
         return np.vstack([self.base.patterns(n_units, seed), missing])
 

@@ -168,8 +168,7 @@ class PaperAcrobotEnv(AcrobotSwingUpEnv):
         require(not options, "options", "hold no more than 'episode'", options)
         if seed is not None:
             self._restart_noise(seed)
-        tolerance = {"goal_tolerance": self.schedule(self._episode)}
-        return super().reset(seed=seed, options=tolerance)
+        return super().reset(seed=seed, options={"goal_tolerance": self.schedule(self._episode)})
 
     def _observation(self) -> NDArray[np.float64]:
         return self._sensors.observe(self.state)

@@ -111,8 +111,7 @@ class AcrobotPicture:
             self._disc(centre, 0.55 * radius, _PAPER)
         self._disc(tip, 0.06, _GOAL if solved else _INK)
         self._draw_torque(elbow, torque)
-        n_decisions = f"decision {decision} / {self._config.max_decisions}"
-        self._write(16, 16, n_decisions, self._large_font)
+        self._write(16, 16, f"decision {decision} / {self._config.max_decisions}", self._large_font)
         self._write(16, 42, f"height {tip.imag:+.2f} m")
         self._write(16, 60, f"torque {torque:+.2f} N m", colour=_TORQUE if torque else _INK)
         picture = pygame.transform.smoothscale(self._canvas, (_SIZE, _SIZE))

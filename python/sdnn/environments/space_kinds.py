@@ -52,8 +52,7 @@ def flat_bounds(space: Space) -> tuple[NDArray[np.float64], NDArray[np.float64]]
 def _bounds_of_parts(space: Space) -> Iterator[tuple[Array, Array]]:
     """Yield the bounds of the parts in the order in which Gymnasium flattens them."""
     if isinstance(space, gym.spaces.Dict | gym.spaces.Tuple):
-        parts = space.spaces.values() if isinstance(space, gym.spaces.Dict) else space.spaces
-        for part in parts:
+        for part in space.spaces.values() if isinstance(space, gym.spaces.Dict) else space.spaces:
             yield from _bounds_of_parts(part)
         return
     flat: Any = gym.spaces.flatten_space(space)

@@ -405,8 +405,7 @@ class BaseSDNN(Fitted, CodedInputs):
         A few samples are learned in place, so nothing that may raise can follow this call.
         """
         self.n_iter_ += 1
-        if self._earlier:
-            self._earlier = ()
+        self._earlier = ()
         if len(bins) <= FEW_SAMPLES and self.training == "auto":
             rule = self._rule_arguments(targets)
             try:
@@ -427,13 +426,12 @@ class BaseSDNN(Fitted, CodedInputs):
         if self.out_of_range == "error":
             raise ValueError(f"X has {first}, but out_of_range is 'error'")
         if self._warns and self.n_inputs_out_of_range_ == 0 and not self._has_outliers:
-            message = f"X has {first}: values outside a range are clipped"
-            warn_caller(message, OutOfRangeWarning)
+            warn_caller(f"X has {first}: values outside a range are clipped", OutOfRangeWarning)
         self.n_inputs_out_of_range_ += n_outside
 
     def _bins(self, X: object) -> Ints:
         """Check samples to predict and return their bins."""
-        table = self._validated(X, codings=self.codings_)
+        table = self._validated(X, codings=self.codings_)  # raises NotFittedError
         return self.network_.input_code.bins(table)
 
     def _bins_of_one(self, x: Sample) -> Ints:

@@ -108,8 +108,7 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
     def _calibrate(self, X: ArrayLike, labels: Array, sample_weight: ArrayLike | None) -> None:
         """Fit the steepness to samples that a second network has not learned."""
         held = learn_without_fifth(self, X, labels, sample_weight, is_stratified=True)
-        by_class = class_weights(self.class_weight, labels)
-        self.steepness_ = self._calibrated_steepness(held, by_class)
+        self.steepness_ = self._calibrated_steepness(held, class_weights(self.class_weight, labels))
 
     def _calibrated_steepness(self, held: HeldOut, by_class: Floats | None) -> float:
         """Return the steepness with the smallest log loss on samples that are held out.

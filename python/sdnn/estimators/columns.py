@@ -193,8 +193,7 @@ def input_pairs(
         if pairs != "all" and n_inputs * len(offsets) > PAIR_BUDGET:
             random = np.random.RandomState(seed)
             offsets = random.permutation(offsets)[: max(1, PAIR_BUDGET // n_inputs)]
-        inputs = range(n_inputs)
-        chosen = [(mu, int(mu + offset) % n_inputs) for mu in inputs for offset in offsets]
+        chosen = [(mu, int(mu + offset) % n_inputs) for mu in range(n_inputs) for offset in offsets]
         return sorted(chosen) or [(0, 0)]
     is_listed = isinstance(pairs, Iterable) and not isinstance(pairs, Iterator)
     require(is_listed, "pairs", "be a list of (modified, modifier)", pairs)

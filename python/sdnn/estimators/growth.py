@@ -75,8 +75,7 @@ def grow(
         patterns[index] = coding.patterns(n_units, int(random.randint(2**31 - 1)))
     for mu, nu in added:
         modified.append(patterns[mu])
-        order = random.permutation(n_units)
-        modifiers.append(np.ascontiguousarray(patterns[nu][:, order]))
+        modifiers.append(np.ascontiguousarray(patterns[nu][:, random.permutation(n_units)]))
     code = InputCode(codings, pairs, modified, modifiers)
     weights = np.zeros((network.n_units, code.core.n_columns), dtype=np.int32)
     weights[:, : before.core.n_columns] = network.layer.weights

@@ -108,8 +108,7 @@ def few_samples(table: Array, codings: Sequence[Coding], samples: Samples) -> tu
 
 def squared_losses(samples: Samples, left_out: Floats) -> Floats:
     """Return squared errors of outputs, in variances of the targets, shape (n_samples,)."""
-    squares = np.square(samples.targets - left_out) / samples.variances
-    losses: Floats = squares.mean(axis=1)
+    losses: Floats = (np.square(samples.targets - left_out) / samples.variances).mean(axis=1)
     return losses
 
 

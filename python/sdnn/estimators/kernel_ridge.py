@@ -44,8 +44,7 @@ LOG_OF_TEN = np.log(10.0)
 
 def log_losses(samples: Samples, left_out: Floats, steepness: float) -> Floats:
     """Return the log loss of each sample by the outputs of the model without it."""
-    log_probabilities = log_softmax(steepness * left_out, axis=1)
-    losses: Floats = -(samples.targets * log_probabilities).sum(axis=1)
+    losses: Floats = -(samples.targets * log_softmax(steepness * left_out, axis=1)).sum(axis=1)
     return losses
 
 
@@ -142,8 +141,7 @@ class BaseKernelRidge(CodedInputs):
         Features of mixtures are in units of their ranges; the largest weight is first, and 1.
         """
         selected, directions = self.selected_features_, self._inputs.directions
-        numbers = range(len(self.codings_))
-        names = self._feature_names() or [f"x{number}" for number in numbers]
+        names = self._feature_names() or [f"x{number}" for number in range(len(self.codings_))]
         lines = [f"{len(selected)} of {len(names)} features", *(names[i] for i in selected)]
         for number, weights in enumerate(directions):
             order = np.argsort(-np.abs(weights), kind="stable")
@@ -194,9 +192,8 @@ class BaseKernelRidge(CodedInputs):
         is_exact = len(components) == len(table)
         # With low rank, half of the components choose inputs and degree, in an eighth of the time.
         for rows in [components] if is_exact else [components[::2], components]:
-            part = samples[rows]
             solution, sizes = self._choose(
-                possible, degrees, table, rows, part, alpha, models_errors=models_errors
+                possible, degrees, table, rows, samples[rows], alpha, models_errors=models_errors
             )
             possible, degrees = [self._inputs], (self.degree_,)
         self._of_samples = KernelOfSamples(self.kernel_, self.X_fit_, self.degree_)
@@ -354,8 +351,7 @@ class SDNNKernelRidge(CodedRegressor, BaseKernelRidge):
         scales: Floats = np.ones(1)
         if is_scaled:
             sizes = sizes / self._residual_scales
-            table = self._inputs_of(X)
-            scales = self._error_scales(self._log_error_sizes(table))
+            scales = self._error_scales(self._log_error_sizes(self._inputs_of(X)))
         widths = error_bounds(sizes, self._residual_counts, share) * scales
         bounds: Floats = np.stack([outputs - widths, outputs + widths], axis=-1)
         return bounds[:, 0] if self._flat else bounds

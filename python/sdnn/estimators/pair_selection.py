@@ -40,8 +40,7 @@ def pairs_among(features: NDArray[np.int64], seed: int) -> Pairs:
     [(3, 7), (7, 3)]
     """
     listed = features.tolist()
-    pairs = input_pairs("budget", None, len(listed), seed)
-    return [(listed[mu], listed[nu]) for mu, nu in pairs]
+    return [(listed[mu], listed[nu]) for mu, nu in input_pairs("budget", None, len(listed), seed)]
 
 
 def select_pairs(

@@ -132,8 +132,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         ``return_std`` adds the standard deviation over the averaged epochs, which shows how settled
         a prediction is (not the noise of the targets).
         """
-        bins = self._bins(X)
-        counts = self._counts(bins, self.n_outputs_, self._n_threads())
+        counts = self._counts(self._bins(X), self.n_outputs_, self._n_threads())
         values = self._outputs_of_counts(mean_of(counts))
         if not return_std:
             return values[:, 0] if self._flat else values

@@ -273,8 +273,7 @@ class StreamEstimator:
         codings = dict(zip(names, self.fitted.codings_, strict=True))
         rows, targets = list(map(self._read, self.samples)), self._targets(self.targets)
         if self.mixed is None:
-            has_window = self.experts == "window"
-            self.mixed = self.experts_class(codings, rows, targets, has_window)
+            self.mixed = self.experts_class(codings, rows, targets, self.experts == "window")
         else:
             self.mixed.begin(codings, rows, targets)
 

@@ -83,8 +83,7 @@ class LibsdnnParameters:
             raise ValueError("inputs must be finite, got NaN or infinity")
         factors = np.array([1 if coded.symbolic else coded.n_bins for coded in self.inputs])
         highest = np.array([coded.n_bins - 1 for coded in self.inputs])
-        bins = np.clip(np.trunc(values * factors), 0, highest)
-        return np.asarray(bins, dtype=np.int32)
+        return np.asarray(np.clip(np.trunc(values * factors), 0, highest), dtype=np.int32)
 
     def make_code(self, library: Library = "msvc") -> _core.SelectiveDesensitization:
         """Return the code with LIBSDNN's own tables; needs a seed in the file."""

@@ -34,8 +34,7 @@ class Table:
         from rich.table import Table as RichTable
         from rich.text import Text
 
-        title = Text(self.title)
-        shown = RichTable(title=title, title_justify="left", box=box.SIMPLE_HEAD)
+        shown = RichTable(title=Text(self.title), title_justify="left", box=box.SIMPLE_HEAD)
         columns = [
             i for i, name in enumerate(self.header) if full or not self.brief or name in self.brief
         ]

@@ -153,8 +153,7 @@ def measure_costs(
     missing = [key for key in planned if key not in stored]
     for number, key in enumerate(missing):
         series, n_inputs = planned[key]
-        title = f"cost: {series.title}, {n_inputs} inputs"
-        observe(Counted(title, number, len(missing)))
+        observe(Counted(f"cost: {series.title}, {n_inputs} inputs", number, len(missing)))
         measured = measure_steps(series, n_inputs, config)
         if measured is not None:
             here = machine.description(), _core.__version__

@@ -200,8 +200,7 @@ def _experiment_with_sensors(
     """Return experiment B with a single case; ValueError unless it alone is to be run."""
     if word != "b":
         name = "noise" if sensors is None else "sensors"
-        problem = f"needs the experiment 'b' (sdnn reproduce b), got {word!r}"
-        raise argument_error(name, problem)
+        raise argument_error(name, f"needs the experiment 'b' (sdnn reproduce b), got {word!r}")
     case = case_of_sensors(
         4 if sensors is None else whole("sensors", sensors, 4, 6),
         SENSOR_NOISE if noise is None else noise,

@@ -9,7 +9,7 @@ from functools import reduce
 from io import BytesIO
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from sdnn.runs.run import Run
 from sdnn.support.csv_files import csv_bytes
 from sdnn.support.files import write_whole
 from sdnn.support.interrupts import stay_interrupts
+from sdnn.support.toml import leaves
 from sdnn.training.loop import Row
 
 if TYPE_CHECKING:
@@ -40,12 +41,12 @@ SUFFIXES = (".png", ".svg", ".pdf")
 HEADER = ("task", "agent", "kind", "n_runs", "run", "step", "value", "low", "high")
 
 Kind: TypeAlias = Literal["return", "running median", "evaluation"]
-Series: TypeAlias = tuple[NDArray[np.int64], NDArray[np.float64]]
-"""Steps and values."""
+Steps: TypeAlias = NDArray[np.int64]
+Floats: TypeAlias = NDArray[np.float64]
+Series: TypeAlias = tuple[Steps, Floats]
+"""Steps and values of a run."""
 
-_KINDS_OF_ROWS: tuple[Kind, Kind] = ("return", "evaluation")
-
-_IGNORED = ("seed", "output", "budget.steps", "budget.episodes")  # goals are compared separately
+_IGNORED = ("seed", "budget.steps", "budget.episodes")  # goals are compared separately
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,6 +57,16 @@ class Group:
     agent: str
     runs: tuple[Run, ...]
 
+    def curve(
+        self, kind: Kind, steps: Steps, values: Floats, run: Run | None = None, **more: Any
+    ) -> Curve:
+        """Make a curve of a run of the group, or of all; ``more`` are other fields of `Curve`."""
+        folder = "" if run is None else str(run.folder)
+        return Curve(
+            task=self.task, agent=self.agent, kind=kind, run=folder, steps=steps, values=values,
+            **more,
+        )  # fmt: skip
+
 
 def groups_of(runs: Sequence[Run]) -> list[Group]:
     """Group runs that differ in their seeds only, in the order of their first runs.
@@ -64,9 +75,10 @@ def groups_of(runs: Sequence[Run]) -> list[Group]:
     """
     members: dict[tuple[tuple[str, str], ...], list[Run]] = {}
     for run in runs:
-        settings = dict(_flat_settings(run.spec.full_values())) | {
-            "goals": ", then ".join(_goal_labels(run))
-        }
+        settings = {"goals": ", then ".join(_goal_labels(run))}
+        for key, value in leaves(run.spec.full_values()):
+            if value != {} and key not in _IGNORED and not key.startswith("output."):
+                settings[key] = value if isinstance(value, str) else json.dumps(value)
         members.setdefault(tuple(sorted(settings.items())), []).append(run)
     groups = []
     for key_values, group_runs in members.items():
@@ -88,17 +100,6 @@ def groups_of(runs: Sequence[Run]) -> list[Group]:
 def environments_of(runs: Sequence[Run]) -> dict[str, EnvironmentSpec]:
     """Return the environment of each panel by the label of its task."""
     return {group.task: group.runs[0].spec.environment for group in groups_of(runs)}
-
-
-def _flat_settings(values: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, str]]:
-    """Yield the settings that distinguish curves: (dotted key, value as text)."""
-    for name, value in values.items():
-        if f"{prefix}{name}" in _IGNORED:
-            continue
-        if isinstance(value, Mapping):
-            yield from _flat_settings(value, f"{prefix}{name}.")
-        else:
-            yield f"{prefix}{name}", value if isinstance(value, str) else json.dumps(value)
 
 
 def _goal_labels(run: Run) -> Iterator[str]:
@@ -125,11 +126,11 @@ class Curve:
     kind: Kind
     n_runs: int = 1
     run: str = ""  # folder of the run; empty for several runs
-    steps: NDArray[np.int64]
-    values: NDArray[np.float64]
+    steps: Steps
+    values: Floats
     # Quartiles over the episodes of an evaluation (single run), or over runs.
-    low: NDArray[np.float64] | None = None
-    high: NDArray[np.float64] | None = None
+    low: Floats | None = None
+    high: Floats | None = None
 
     def rows(self) -> Iterator[tuple[object, ...]]:
         """Yield the numbers under `HEADER`."""
@@ -161,33 +162,17 @@ def _curves_of_group(group: Group) -> tuple[list[Curve], list[str]]:
     their quartiles, those of several runs as medians at their common steps.
     """
     rows = {run: run.rows() for run in group.runs}
-    episodes, evaluated = (
-        {run: pair for run, pair in series.items() if len(pair[0])}
-        for series in (
-            {run: _steps_and_values(run_rows, kind) for run, run_rows in rows.items()}
-            for kind in _KINDS_OF_ROWS
-        )
-    )
+    episodes, evaluated = _series_of(rows, "return"), _series_of(rows, "evaluation")
     missing = "no evaluation" if evaluated else "no episode and no evaluation"
     drawn = evaluated or episodes
     notes = [f"{run.folder}: {missing} is whole yet" for run in group.runs if run not in drawn]
-    curves = [
-        Curve(
-            task=group.task, agent=group.agent, run=str(run.folder),
-            kind="return", steps=steps, values=values,
-        )
-        for run, (steps, values) in episodes.items()
-    ]  # fmt: skip
+    curves = [group.curve("return", *series, run) for run, series in episodes.items()]
     curves += _running_medians(group, episodes)
     if len(evaluated) == 1:
-        ((run, (steps, values)),) = evaluated.items()
+        ((run, series),) = evaluated.items()
         returns = (row["returns"] for row in rows[run] if row["kind"] == "evaluation")
         low, high = np.array([np.percentile(several, (25, 75)) for several in returns]).T
-        evaluation = Curve(
-            task=group.task, agent=group.agent, run=str(run.folder),
-            kind="evaluation", steps=steps, values=values, low=low, high=high,
-        )  # fmt: skip
-        return [*curves, evaluation], notes
+        return [*curves, group.curve("evaluation", *series, run, low=low, high=high)], notes
     if not evaluated:
         return curves, notes
     folders = ", ".join(str(run.folder) for run in evaluated)
@@ -209,10 +194,7 @@ def _running_medians(group: Group, episodes: Mapping[Run, Series]) -> Iterator[C
     medians = {run: _running_median(values) for run, (_, values) in episodes.items()}
     if len(episodes) < 2:
         for run, (steps, _) in episodes.items():
-            yield Curve(
-                task=group.task, agent=group.agent, run=str(run.folder),
-                kind="running median", steps=steps, values=medians[run],
-            )  # fmt: skip
+            yield group.curve("running median", steps, medians[run], run)
         return
     all_steps = [steps for steps, _ in episodes.values()]
     first, last = max(steps[0] for steps in all_steps), min(steps[-1] for steps in all_steps)
@@ -228,29 +210,27 @@ def _running_medians(group: Group, episodes: Mapping[Run, Series]) -> Iterator[C
     yield _median_curve(group, "running median", grid, np.array(values))
 
 
-def _median_curve(
-    group: Group, kind: Kind, steps: NDArray[np.int64], values: NDArray[np.float64]
-) -> Curve:
+def _median_curve(group: Group, kind: Kind, steps: Steps, values: Floats) -> Curve:
     """Return the median over runs, with its quartiles, of values of shape (n_runs, n_steps)."""
     low, middle, high = np.percentile(values, (25, 50, 75), axis=0)
-    return Curve(
-        task=group.task, agent=group.agent, n_runs=len(values),
-        kind=kind, steps=steps, values=middle, low=low, high=high,
-    )  # fmt: skip
+    return group.curve(kind, steps, middle, n_runs=len(values), low=low, high=high)
 
 
-def _running_median(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _running_median(values: Floats) -> Floats:
     """Return the median of the last `WINDOW` values at each of them."""
     ends = range(1, len(values) + 1)
     return np.array([np.median(values[max(0, end - WINDOW) : end]) for end in ends])
 
 
-def _steps_and_values(rows: Sequence[Row], kind: Kind) -> Series:
-    """Return the steps and returns of a run's evaluations, or of its episodes."""
-    wanted, name = ("evaluation", "mean_return") if kind == "evaluation" else ("episode", "return")
-    matching = [row for row in rows if row["kind"] == wanted]
-    steps = np.array([row["step"] for row in matching], np.int64)
-    return steps, np.array([row[name] for row in matching], np.float64)
+def _series_of(rows_of_runs: Mapping[Run, Sequence[Row]], kind: Kind) -> dict[Run, Series]:
+    """Return the steps and returns of episodes, or of evaluations, of the runs that have any."""
+    row_kind, name = ("episode", "return") if kind == "return" else ("evaluation", "mean_return")
+    series = {}
+    for run, rows in rows_of_runs.items():
+        if matching := [row for row in rows if row["kind"] == row_kind]:
+            steps = np.array([row["step"] for row in matching], np.int64)
+            series[run] = steps, np.array([row[name] for row in matching], np.float64)
+    return series
 
 
 def write_curves(

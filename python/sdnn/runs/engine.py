@@ -180,7 +180,7 @@ def _work_of(spec: RunSpec) -> int:
     return spec.length * spec.entry.step_work(spec.core_settings()["approximator"])
 
 
-def _least_work(*team: PlannedTrial) -> int:
+def _minus_work(*team: PlannedTrial) -> int:
     """Return a key that sorts trials, or teams of them, with most work first."""
     return -sum(_work_of(planned.spec) for planned in team)
 
@@ -206,12 +206,13 @@ def run_trials(
     instruction_set()
     planned = tuple(plan)
     stored = store.keys()
-    missing = sorted((p for p in planned if p.key not in stored), key=_least_work)
+    missing = sorted((p for p in planned if p.key not in stored), key=_minus_work)
     n_reused = len(planned) - len(missing)
     failures: list[Failed] = []
     n_run = 0
 
     def add(finished: Sequence[Finished]) -> None:
+        """Store trials one after the other; trials in C++ must have the same rows each time."""
         for message in finished:
             store.add(message.record, is_exact=message.planned.spec.is_compiled)
 
@@ -224,9 +225,7 @@ def run_trials(
             if finished:
                 with store.together():
                     add(finished)
-        except (
-            StoreError
-        ):  # nothing of the batch is stored: keep what comes before the faulty trial
+        except StoreError:  # nothing of the batch is stored: add those before the faulty trial
             add(finished)
         n_run += len(finished)
 
@@ -337,7 +336,7 @@ class Team:
         trials = tuple(self.trials.values())
         trials[0].advance_together(trials, n_decisions)
         seconds = time.thread_time() - begin
-        n_new = {k: t.n_decisions - self._n_decisions[k] for k, t in self.trials.items()}
+        n_new = {key: t.n_decisions - self._n_decisions[key] for key, t in self.trials.items()}
         for key, n in n_new.items():
             self._n_decisions[key] += n
             self._seconds[key] += seconds * n / sum(n_new.values())
@@ -375,7 +374,7 @@ def teams_of(planned: Iterable[PlannedTrial], jobs: int) -> Iterable[list[Planne
     for alike in by_task.values():
         size = min(MOST_TOGETHER, -(-len(alike) // jobs))
         teams += [alike[k : k + size] for k in range(0, len(alike), size)]
-    return sorted(teams, key=lambda team: _least_work(*team))
+    return sorted(teams, key=lambda team: _minus_work(*team))
 
 
 class ThreadExecutor:

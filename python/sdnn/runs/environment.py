@@ -185,8 +185,7 @@ class EnvironmentSpec(Settings, frozen=True):
                 try:
                     env = ActionMasks(env)
                 except ValueError as error:
-                    problem = f"{self.id}: {error}"
-                    raise ConfigError("environment.action_masks", problem) from error
+                    raise ConfigError("environment.action_masks", f"{self.id}: {error}") from error
             low, high = self.ends(env)
             if not self.has_other_sensors:
                 return env

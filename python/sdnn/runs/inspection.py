@@ -7,7 +7,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import gymnasium as gym
 import numpy as np
@@ -21,7 +21,6 @@ from sdnn.agents.inspection import (
     Floats,
     Influence,
     Reader,
-    States,
     influences,
     inputs_of,
     meet_states,
@@ -31,7 +30,7 @@ from sdnn.agents.inspection_figures import axis_label, draw_influences, draw_map
 from sdnn.agents.q_learning import ValueAgent
 from sdnn.agents.schedules import schedule_of
 from sdnn.agents.state_maps import Replay, StateMap, map_of, replay
-from sdnn.environments.types import Data, Env
+from sdnn.environments.types import Data
 from sdnn.reports.pages import Page, Section, Table
 from sdnn.reports.plots import (
     FAINT,
@@ -56,9 +55,9 @@ from sdnn.training.loop import Row
 FILE_NAME = "inspect.html"
 FEW_UNITS = 1_000
 """Number of value units in a reward below which rewards are rounded noticeably."""
-NARROW, OUTSIDE = 0.1, 0.1
-"""Share of a range that is hardly used, and share of observations outside that is large."""
-N_POINTS = 60
+LITTLE_USED, OFTEN_OUTSIDE = 0.1, 0.1
+"""Share of a range below which it is hardly used, and share of states outside that is large."""
+N_POINTS = 60  # points of a curve of scheduled settings
 
 
 class RangeUse(NamedTuple):
@@ -121,20 +120,15 @@ class Inspection:
                 f"States have a history ({self.agent.history}): each state counts as the first"
                 " observation of an episode."
             )
-        map_parts = (self.agent, self.value_name, self.state_map, self.states)
-        picture, narrow_picture = _pictures(partial(draw_map, *map_parts))
-        yield Section(
+        yield _drawn_section(
+            partial(draw_map, self.agent, self.value_name, self.state_map, self.states),
             title=f"Values and actions over {names}",
-            picture=picture,
-            narrow_picture=narrow_picture,
             alt=f"Value and greedy action over {names}",
             notes=notes,
         )
-        picture, narrow_picture = _pictures(partial(draw_influences, self.influences))
-        yield Section(
+        yield _drawn_section(
+            partial(draw_influences, self.influences),
             title="Influence of each input",
-            picture=picture,
-            narrow_picture=narrow_picture,
             alt="Change of values and actions where an input is shuffled",
             is_narrow=True,
             table=self.input_table(),
@@ -147,12 +141,9 @@ class Inspection:
         )
         episode, order = self.episode, [i.input for i in self.influences]
         end = "terminated" if episode.terminated else "not terminated"
-        replay_parts = (self.agent, self.value_name, episode, order)
-        picture, narrow_picture = _pictures(partial(draw_replay, *replay_parts))
-        yield Section(
+        yield _drawn_section(
+            partial(draw_replay, self.agent, self.value_name, episode, order),
             title="A greedy episode",
-            picture=picture,
-            narrow_picture=narrow_picture,
             alt="Inputs, values and actions over the steps of a greedy episode",
             is_narrow=True,
             notes=[
@@ -160,11 +151,9 @@ class Inspection:
                 " first episode of sdnn evaluate."
             ],
         )
-        picture, narrow_picture = _pictures(self.draw_learning)
-        yield Section(
+        yield _drawn_section(
+            self.draw_learning,
             title="Learning",
-            picture=picture,
-            narrow_picture=narrow_picture,
             alt="Returns, epsilon and alpha over the steps",
             is_narrow=True,
             table=Table("Numbers", ("quantity", "value"), self.numbers()),
@@ -176,12 +165,12 @@ class Inspection:
         for influence in self.influences:
             agent_input = influence.input
             low, high = agent_input.limits(self.states)
+            numbers = agent_input.numbers(self.states)
             met = f"{low:.4g} to {high:.4g}"
             if self._is_constant(agent_input):
-                met = f"{agent_input.numbers(self.states)[0]:.4g}"
+                met = f"{numbers[0]:.4g}"
             if agent_input.has_symbols:
-                n_met = len(np.unique(agent_input.numbers(self.states)))
-                met = f"{n_met} of {len(agent_input.columns)} symbols"
+                met = f"{len(np.unique(numbers))} of {len(agent_input.columns)} symbols"
             use = self.range_use(agent_input)
             rows.append(
                 (
@@ -303,10 +292,10 @@ class Inspection:
             use = self.range_use(agent_input)
             if agent_input.is_used and self._is_constant(agent_input):
                 yield f"{agent_input.name} is constant: the agent can do without it."
-            elif use is not None and use.within < NARROW:
+            elif use is not None and use.within < LITTLE_USED:
                 share = f"{use.within:.0%}"
                 yield f"{agent_input.name} uses only {share} of its range: --range narrows it."
-            if use is not None and use.outside > OUTSIDE:
+            if use is not None and use.outside > OFTEN_OUTSIDE:
                 yield f"{agent_input.name} is outside its range in {use.outside:.0%} of the states."
 
     def draw_learning(self, *, narrow: bool = False) -> Figure:
@@ -374,9 +363,10 @@ class Inspection:
         }
 
 
-def _pictures(draw: Callable[..., Figure]) -> tuple[bytes, bytes]:
-    """Return a figure for a page, and the narrow one for telephones."""
-    return svg_bytes(draw()), png_bytes(draw(narrow=True), NARROW_DPI)
+def _drawn_section(draw: Callable[..., Figure], **fields: Any) -> Section:
+    """Make a section with the figure that `draw` returns, and its narrow form for telephones."""
+    narrow = png_bytes(draw(narrow=True), NARROW_DPI)
+    return Section(picture=svg_bytes(draw()), narrow_picture=narrow, **fields)
 
 
 def inspect_run(
@@ -406,7 +396,10 @@ def inspect_run(
         run.check_spaces(agent, env)
         options = run.reset_options(env)
         try:
-            states = _states(agent, env, root, options)
+            states = meet_states(agent, env, root % 2**32, options)
+        except ValueError as error:
+            raise RunError(f"no states were met: {error}") from error
+        try:
             measured = influences(reader, states, inputs, root % 2**32)
             chosen = chosen or [i.input for i in measured if i.input.is_used][:2]
             state_map = map_of(reader, states, chosen, inputs)
@@ -428,15 +421,6 @@ def inspect_run(
     )
 
 
-def _states(agent: AnyAgent, env: Env, root: int, options: Data | None) -> States:
-    """Collect states in episodes of `env`; RunError if it gives none."""
-    try:
-        return meet_states(agent, env, root % 2**32, options)
-    except ValueError as error:
-        raise RunError(f"no states were met: {error}") from error
-
-
 def write_inspection(inspection: Inspection, path: Path) -> None:
     """Write the page as self-contained HTML; OSError if that is impossible."""
-    call = f"Made on {machine.description()}."
-    write_whole(path, inspection.page().to_html(call).encode())
+    write_whole(path, inspection.page().to_html(f"Made on {machine.description()}.").encode())

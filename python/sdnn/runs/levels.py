@@ -44,25 +44,19 @@ def levels_of(
 
     These are the goal of the environment's registration, unless arguments change the environment;
     the mean return of random actions, in environments of Gymnasium and of this package; and the
-    baselines that are named. With `plain` only these. RunError if a name is not that of a stored
-    baseline.
+    baselines that are named. With `plain` only these. RunError for a baseline that is not stored.
     """
     known = baseline_names()
     for name in baselines:
         if name not in known:
-            names = ", ".join(map(repr, known))
-            raise RunError(f"baseline must be one of {names}, got {name!r}")
+            raise RunError(f"baseline must be one of {', '.join(map(repr, known))}, got {name!r}")
     levels, notes = [], []
     for task, environment in tasks.items():
-        lines = {} if plain else {
-            "goal": goal_of(environment), "random actions": mean_random_return(environment)
-        }  # fmt: skip
-        levels += [
-            Level(task=task, title=title, value=value)
-            for title, value in lines.items()
-            if value is not None
-        ]
-        stored = {} if _is_changed(environment) else _baselines().get(environment.id, {})
+        for title, measure in (("goal", goal_of), ("random actions", mean_random_return)):
+            if not plain and (value := measure(environment)) is not None:
+                levels.append(Level(task=task, title=title, value=value))
+        is_changed = environment != EnvironmentSpec(id=environment.id)
+        stored = {} if is_changed else _baselines().get(environment.id, {})
         for name in baselines:
             if name in stored:
                 levels.append(Level(task=task, title=name, value=stored[name]))
@@ -80,13 +74,12 @@ def goal_of(environment: EnvironmentSpec) -> float | None:
 
 
 class _RandomAgent:
-    """Acts at random."""
+    """An agent that takes random actions of a space."""
 
     def __init__(self, actions: Space) -> None:
         self._actions = actions
 
     def act(self, observation: Element, explore: bool = False) -> Element:
-        """Return any action of the space."""
         return self._actions.sample()
 
 
@@ -98,24 +91,17 @@ def mean_random_return(environment: EnvironmentSpec) -> float | None:
     if entry.partition(".")[0] not in _MEASURED_PACKAGES or environment.action_masks:
         return None
     returns: list[float] = []
-    n_steps = 0
+    n_steps_left = MAX_STEPS
     with closing(environment.without_noise().make()) as env:
         env.action_space.seed(0)
         agent = _RandomAgent(env.action_space)
         for episode in range(MAX_EPISODES):
             for now in greedy_episode(agent, env, 0, episode):
-                if n_steps + now.n_steps > MAX_STEPS:
-                    break
-            else:
-                returns.append(now.total_reward)
-                n_steps += now.n_steps
-                continue
-            break
-    return float(np.mean(returns)) if returns else None
-
-
-def _is_changed(environment: EnvironmentSpec) -> bool:
-    return environment != EnvironmentSpec(id=environment.id)
+                if now.n_steps > n_steps_left:  # an episode that is cut off has no return
+                    return float(np.mean(returns)) if returns else None
+            returns.append(now.total_reward)
+            n_steps_left -= now.n_steps
+    return float(np.mean(returns))
 
 
 @cache

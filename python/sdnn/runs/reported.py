@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import importlib
 import json
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol, TypeAlias
+from typing import Protocol
 
 import gymnasium as gym
 
@@ -25,6 +25,7 @@ from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.study_file import MOST_TRIALS
 from sdnn.runs.trial import TrialKey, TrialRecord, TrialRows
 from sdnn.support.arguments import shown
+from sdnn.support.toml import leaves
 
 MOST_TABLE_BYTES = 2**33
 """Largest limit of an agent's tables that a reported configuration may set, in bytes."""
@@ -36,8 +37,6 @@ _TRUSTED = frozenset({"gymnasium", "sdnn"})
 """Packages whose registered environments need no consent."""
 _TRUSTED_MODULES = frozenset({"gymnasium", "sdnn", "sdnn.environments"})
 """Modules that an environment's id may name without consent."""
-
-Values: TypeAlias = Mapping[str, object]
 
 
 @dataclass(frozen=True)
@@ -62,10 +61,9 @@ class Consent:
         module = environment_id.rpartition(":")[0]
         if module in _TRUSTED_MODULES:
             return
-        trusted = _TRUSTED
-        if module:  # an id "module:Env-v0" imports that module, whatever is registered
-            trusted = frozenset()
-        else:  # the package of a registered environment's class
+        allowed = {name.partition(".")[0] for name in self.modules}
+        if not module:  # else the id imports the module, whatever is registered
+            allowed |= _TRUSTED
             registered = gym.registry.get(environment_id)
             entry_point = registered.entry_point if registered else None
             if isinstance(entry_point, str):
@@ -73,7 +71,6 @@ class Consent:
             elif entry_point is not None:
                 module = entry_point.__module__
         package = module.partition(".")[0]
-        allowed = trusted | {name.partition(".")[0] for name in self.modules}
         if package and package not in allowed:
             problem = f"is code of the module {module}, which runs only if you trust it"
             raise ConfigError("environment.id", f"{environment_id} {problem}: --import {module}")
@@ -197,19 +194,13 @@ def changed_settings(before: str, after: str) -> dict[str, tuple[str, str]]:
     >>> changed_settings('{"a":{"b":1,"c":2}}', '{"a":{"b":1,"c":3}}')
     {'a.c': ('2', '3')}
     """
-    pairs = [dict(_settings(json.loads(text))) for text in (before, after)]
-    keys = dict.fromkeys(key for settings in pairs for key in settings)
-    texts = {key: (pairs[0].get(key, "missing"), pairs[1].get(key, "missing")) for key in keys}
+    old, new = (
+        {key: json.dumps(value) for key, value in leaves(json.loads(text))}
+        for text in (before, after)
+    )
+    keys = dict.fromkeys((*old, *new))
+    texts = {key: (old.get(key, "missing"), new.get(key, "missing")) for key in keys}
     return {key: pair for key, pair in texts.items() if pair[0] != pair[1]}
-
-
-def _settings(table: Values, prefix: str = "") -> Iterator[tuple[str, str]]:
-    """Yield the settings of nested tables: (dotted key, value as JSON)."""
-    for name, value in table.items():
-        if isinstance(value, dict) and value:
-            yield from _settings(value, f"{prefix}{name}.")
-        else:
-            yield f"{prefix}{name}", json.dumps(value)
 
 
 class Reports(Protocol):
@@ -277,8 +268,7 @@ class StoredReports:
                     f"; {key} is {here}, of the rows {stored}"
                     for key, (stored, here) in changes.items()
                 )
-            goals = () if run is None else run.goals
-            yield ReportedTrial.of_record(record, goals, problem)
+            yield ReportedTrial.of_record(record, () if run is None else run.goals, problem)
 
     def _load(self, store: ResultStore, key: TrialKey) -> tuple[TrialRecord, str]:
         """Return the record of a trial, and the problem of its rows or an empty text."""

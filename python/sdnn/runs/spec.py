@@ -328,8 +328,7 @@ class RunSpec(Settings, frozen=True):
         entry = self.entry
         approximator = self.approximator
         shape = env.observation_space.shape
-        is_agent = _is_class_of(entry.agent, Agent)
-        if not is_agent and shape is not None and len(shape) == 1:
+        if not _is_class_of(entry.agent, Agent) and shape is not None and len(shape) == 1:
             approximator = with_n_inputs(approximator, shape[0])  # others count inputs themselves
         try:
             agent = entry.agent(

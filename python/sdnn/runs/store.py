@@ -305,8 +305,7 @@ class ResultStore(AbstractContextManager["ResultStore"]):
 
     def _rows(self, run: _Run) -> TrialRows:
         order = "WHERE run_id = ? ORDER BY number, part"
-        values = self._read(_Rows, _ROW_COLUMNS, "rows", order, run.id)
-        rows = TrialRows(np.array(values, ROW))
+        rows = TrialRows(np.array(self._read(_Rows, _ROW_COLUMNS, "rows", order, run.id), ROW))
         if rows.checksum() != run.checksum:
             raise ChangedRowsError(self.path, run.key, self._make_record(run, rows))
         return rows
@@ -404,8 +403,7 @@ def _inspect(path: Path) -> bool:
 
 
 def _objects(connection: sqlite3.Connection) -> set[tuple[str | None, ...]]:
-    cursor = connection.execute("SELECT type, name, tbl_name, sql FROM sqlite_master")
-    return set(cursor.fetchall())
+    return set(connection.execute("SELECT type, name, tbl_name, sql FROM sqlite_master").fetchall())
 
 
 @cache

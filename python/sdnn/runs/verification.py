@@ -215,7 +215,8 @@ def verify(
     if unexplained and signal is None:
         repeated, signal = _run(unexplained, executor, observe)
         for key in repeated:
-            if _are_different(results[key], repeated[key]):
+            records = [r for r in (results[key], repeated[key]) if isinstance(r, TrialRecord)]
+            if len({record.rows.checksum() for record in records}) == 2:
                 problem = "its environment or agent does not repeat itself: two runs here differ"
                 differences[key] = Difference(key, problem, _about(reported[key], reports))
     return Verification(
@@ -246,12 +247,6 @@ def _plan(
         resumed = ResumedTrial(key, spec, trial.goals)
         plan.append(resumed if trial.goals else PlannedTrial(key, spec))
     return plan, differences
-
-
-def _are_different(first: TrialRecord | Exception, second: TrialRecord | Exception) -> bool:
-    if isinstance(first, Exception) or isinstance(second, Exception):
-        return False
-    return first.rows.checksum() != second.rows.checksum()
 
 
 def _run(

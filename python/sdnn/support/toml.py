@@ -7,6 +7,7 @@ import functools
 import json
 import operator
 import re
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from typing import TypeAlias, cast
 
@@ -72,6 +73,19 @@ def deep_key(value: object, key: KeyPath = ()) -> KeyPath | None:
     items = value.items() if isinstance(value, dict) else enumerate(cast("list[object]", value))
     inner = (((*key, name), item) for name, item in items if isinstance(item, dict | list))
     return next((deep for at, item in inner if (deep := deep_key(item, at))), None)
+
+
+def leaves(table: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:
+    """Yield (dotted key, value) of a table and the tables in it; empty tables are values.
+
+    >>> dict(leaves({"agent": {"name": "rbf", "angles": {}}, "seed": 1}))
+    {'agent.name': 'rbf', 'agent.angles': {}, 'seed': 1}
+    """
+    for name, value in table.items():
+        if isinstance(value, Mapping) and value:
+            yield from leaves(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value
 
 
 def dotted(key: KeyPath) -> str:
