@@ -63,18 +63,17 @@ Learning = TypeVar("Learning")
 
 
 def presets_of(listed: Mapping[str, tuple[Any, ...]]) -> Mapping[str, Preset]:
-    """Return the presets of the core by name."""
+    """Return presets by name; the core has title, both parts, and perhaps observations of each."""
     presets = {}
     for name, settings in listed.items():
-        title, approximator, learning, observed = (*settings, _core.ObservationConfig())[:4]
-        presets[name] = Preset(
-            title, approximator, learning,
-            "find" if observed.find_angle_pairs else "none",
-            "relevant" if observed.relevant_only else "all",
-            observed.history,
-            "running" if observed.running else None,
-            observed.narrowed,
-        )  # fmt: skip
+        observed = settings[3] if len(settings) > 3 else _core.ObservationConfig()
+        presets[name] = Preset(*settings[:3])._replace(
+            angle_pairs="find" if observed.find_angle_pairs else "none",
+            inputs="relevant" if observed.relevant_only else "all",
+            history=observed.history,
+            observation_range="running" if observed.running else None,
+            narrows_ranges=observed.narrowed,
+        )
     return MappingProxyType(presets)
 
 
@@ -147,6 +146,7 @@ class BaseAgent(Advised, abc.ABC, Generic[Approximator, Learning]):
         self._make_controller(tables=[] if tables is None else list(pattern_tables(tables)))
 
     def _take_spaces(self, observations: Space, actions: Space) -> None:
+        """Store the spaces; TypeError or ValueError if agents cannot use them."""
         self._observations = Observations(observations)
         self._actions = Actions(actions)
 
@@ -379,12 +379,10 @@ class BaseAgent(Advised, abc.ABC, Generic[Approximator, Learning]):
         None where a subclass or user has replaced `act` or `learn`, which must be called then.
         """
         functions = [getattr(method, "__func__", None) for method in (self.act, self.learn)]
-        actions = self._actions
         if functions != [BaseAgent.act, BaseAgent.learn]:
             return None
-        return CoreParts(
-            self._controller, self._observations.rows, actions.batch, actions.learned_mask
-        )
+        read, actions = self._observations.rows, self._actions
+        return CoreParts(self._controller, read, actions.batch, actions.learned_mask)
 
     @property
     def scaling(self) -> Scaling | None:
@@ -397,8 +395,8 @@ class BaseAgent(Advised, abc.ABC, Generic[Approximator, Learning]):
 
     @scaling.setter
     def scaling(self, scaling: Scaling | None) -> None:
-        is_one = isinstance(scaling, Scaling | None)
-        require(is_one, "scaling", "be a Scaling or None", scaling, TypeError)
+        is_scaling = isinstance(scaling, Scaling | None)
+        require(is_scaling, "scaling", "be a Scaling or None", scaling, TypeError)
         self._scaling = scaling
 
     def save(self, path: str | Path) -> None:

@@ -127,22 +127,22 @@ def _with_next_observations(
 
     The last step of a truncated episode then has no next observation, and is left out.
     """
-    waiting: tuple[Data, str] | None = None
+    pending: tuple[Data, str] | None = None  # the last row and its place, without that observation
     for place, row in rows:
-        if waiting is not None:
-            waiting[0]["next_observations"] = row["observations"]
-            yield _logged(*waiting)
-            waiting = None
+        if pending is not None:
+            pending[0]["next_observations"] = row["observations"]
+            yield _logged(*pending)
+            pending = None
         if "rewards" not in row:  # only the observation after the last step
             continue
         if "next_observations" in row:
             yield _logged(row, place)
             continue
-        is_end = _flag("terminations", row.get("terminations", False))
-        is_cut = _flag("truncations", row.get("truncations", False))
-        if is_episode or not (is_end or is_cut):
-            waiting = row, place
-        elif is_end:
+        is_terminated = _flag("terminations", row.get("terminations", False))
+        is_truncated = _flag("truncations", row.get("truncations", False))
+        if is_episode or not (is_terminated or is_truncated):
+            pending = row, place
+        elif is_terminated:
             row["next_observations"] = row["observations"]  # not used: no value follows
             yield _logged(row, place)
 
@@ -206,6 +206,7 @@ def _columns_in(item: Any) -> Data | None:
 
 
 def _value(values: Info, name: str, default: Any = None) -> Any:
+    """Return the value of a column of `NAMES` under any of its names, or the default."""
     return next((values[other] for other in (name, *NAMES[name]) if other in values), default)
 
 
@@ -277,13 +278,12 @@ def _columns_of(values: Info, where: str = "dataset", *, is_episode: bool = Fals
     require(not missing, where, f"have {', '.join(missing)}", [*values])
     n = _n_rows_of(columns["rewards"])
     lengths = {name: _n_rows_of(column) for name, column in columns.items()}
-    one_more = ("observations",) if "next_observations" not in columns else ()
-    expected = f"have {n} rows of each, as of rewards" + " (of observations one more)" * bool(
-        one_more
-    )
-    fits = all(m == n or (name in one_more and m == n + 1) for name, m in lengths.items())
-    require(fits, where, expected, lengths)
-    if is_episode and one_more:
+    may_have_last = "next_observations" not in columns  # the observation after the last step
+    others = {length for name, length in lengths.items() if name != "observations"}
+    fits = others == {n} and lengths["observations"] - n in (0, int(may_have_last))
+    more = " (of observations one more)" if may_have_last else ""
+    require(fits, where, f"have {n} rows of each, as of rewards{more}", lengths)
+    if is_episode and may_have_last:
         is_whole = lengths["observations"] == n + 1
         require(is_whole, where, f"have {n + 1} observations for {n} rewards", lengths)
     return columns
@@ -295,15 +295,12 @@ def _checked_column(name: str, column: Any) -> Any:
         return {key: _checked_column(f"{name}[{key!r}]", part) for key, part in column.items()}
     if isinstance(column, tuple) and column and np.ndim(column[0]) > 0:
         return tuple(_checked_column(f"{name}[{i}]", part) for i, part in enumerate(column))
-    if getattr(getattr(column, "dtype", None), "kind", "") == "O" or _is_of_mappings(column):
+    has_mappings = isinstance(column, list) and column and isinstance(column[0], Mapping)
+    if has_mappings or getattr(getattr(column, "dtype", None), "kind", "") == "O":
         return list(column)  # rows of dictionaries or tuples, which the agent reads
     if isinstance(column, np.ma.MaskedArray):  # the agent reads masks as missing values
         return list(column) if np.ma.is_masked(column) else column.data
     return array_of(name, column)
-
-
-def _is_of_mappings(column: Any) -> bool:
-    return isinstance(column, list) and bool(column) and isinstance(column[0], Mapping)
 
 
 def _n_rows_of(column: Any) -> int:
@@ -329,9 +326,9 @@ def _element_at(values: Any, t: int) -> Any:
     """Return element t of an array, or of each array in nested dictionaries and tuples."""
     if isinstance(values, Mapping):
         return {name: _element_at(part, t) for name, part in values.items()}
-    return (
-        tuple(_element_at(part, t) for part in values) if isinstance(values, tuple) else values[t]
-    )
+    if isinstance(values, tuple):
+        return tuple(_element_at(part, t) for part in values)
+    return values[t]
 
 
 class MinariDataset(Protocol):

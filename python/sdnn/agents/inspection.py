@@ -70,10 +70,7 @@ class AgentInput:
         """Write numbers, as `numbers` returns them, into states, in place."""
         if self.type == "angle":
             radians = np.radians(numbers)
-            states[:, self.columns[0]], states[:, self.columns[1]] = (
-                np.cos(radians),
-                np.sin(radians),
-            )
+            states[:, list(self.columns)] = np.stack([np.cos(radians), np.sin(radians)], axis=1)
         elif self.has_symbols:
             states[:, list(self.columns)] = np.eye(len(self.columns))[numbers.astype(np.int64)]
         else:
@@ -151,6 +148,7 @@ def inputs_of(agent: AnyAgent) -> list[AgentInput]:
 
 
 def _symbol(names: list[str], first: int, n: int, *, is_used: bool = True) -> AgentInput:
+    """Return the input of a symbol: n variables from the first one on, one for each value."""
     name = names[first].partition(" = ")[0]
     return AgentInput(name, "symbol", tuple(range(first, first + n)), is_used)
 
@@ -214,12 +212,6 @@ class Reader:
         self._n_dimensions = len(agent._action.low)
 
     @property
-    def most_reads(self) -> int:
-        """Number of states that may be read for influences."""
-        is_linear = self.agent.kind in ("q-lambda", "actor-critic")
-        return MOST_READS if is_linear else MOST_SLOW_READS
-
-    @property
     def value_name(self) -> str:
         """The name of the values of states."""
         return "V(s)" if self._has_state_values else "max Q(s, a)"
@@ -247,13 +239,16 @@ class Reader:
             pairs = zip(states.rows, masks, strict=True)
             actions = np.array([self._act(state, mask) for state, mask in pairs])
         else:
-            best = ([int(np.argmax(part)) for part in of_state] for of_state in parts)
-            numbers = [self._numbers_of(d) for d in range(self._n_dimensions)]
-            actions = np.array([[n[i] for n, i in zip(numbers, row, strict=True)] for row in best])
-        rows, allowed = (
-            np.array([np.concatenate(of_state) for of_state in read]) for read in (all_parts, parts)
-        )
-        return Reading(rows, np.isfinite(allowed), values, actions)
+            action_of = self._core.action_of  # the number of an action from its index
+            actions = np.array(
+                [
+                    [action_of(int(np.argmax(part)), d) for d, part in enumerate(of_state)]
+                    for of_state in parts
+                ]
+            )
+        action_values = np.array([np.concatenate(of_state) for of_state in all_parts])
+        allowed = np.isfinite([np.concatenate(of_state) for of_state in parts])
+        return Reading(action_values, allowed, values, actions)
 
     def _allowed_parts(self, parts: list[Floats], mask: Flags | None) -> list[Floats]:
         """Return values of actions, those that a mask forbids as minus infinity."""
@@ -269,13 +264,9 @@ class Reader:
         return [self._core.values(state, d) for d in range(self._n_dimensions)]
 
     def _value_of(self, parts: list[Floats]) -> float:
+        """Return the value of the best action: with Q(lambda) the sum over dimensions, or mean."""
         best = [float(part.max()) for part in parts]
         return sum(best) if self.agent.kind == "q-lambda" else sum(best) / len(best)
-
-    def _numbers_of(self, dimension: int) -> Floats:
-        """Return the actions of a dimension as numbers, in the order of their values."""
-        n_actions = self._core.n_actions[dimension]
-        return np.array([self._core.action_of(i, dimension) for i in range(n_actions)])
 
     def _act(self, state: Floats, mask: Flags | None) -> Floats:
         """Return the greedy action in a state as the first of an episode."""
@@ -380,8 +371,10 @@ def influences(
     """
     generator = np.random.default_rng(seed)
     n_used = max(1, sum(agent_input.is_used for agent_input in inputs))
+    is_fast = reader.agent.kind in ("q-lambda", "actor-critic")
+    most_reads = MOST_READS if is_fast else MOST_SLOW_READS
     # Fewer than 50 states would leave influences to chance, however slow they are to read.
-    states = states.thinned(max(50, reader.most_reads // (N_SHUFFLES * n_used)))
+    states = states.thinned(max(50, most_reads // (N_SHUFFLES * n_used)))
     before = reader.read(states)
     known = before.allowed.any(axis=0)  # actions that a mask allows in some state
     variances = before.action_values[:, known].var(axis=0, where=before.allowed[:, known])
@@ -406,10 +399,7 @@ def influences(
         max((getattr(influence, name) for influence in measured), default=0.0) or 1.0
         for name in ("on_values", "on_actions")
     ]
-    return sorted(
-        measured,
-        key=lambda i: -i.on_values / largest[0] - i.on_actions / largest[1],
-    )
+    return sorted(measured, key=lambda i: -i.on_values / largest[0] - i.on_actions / largest[1])
 
 
 def _action_change(agent: AnyAgent, before: Floats, after: Floats) -> float:

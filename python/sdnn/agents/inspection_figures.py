@@ -201,6 +201,7 @@ def _finish_curve(axes: Axes, state_map: StateMap, states: Floats) -> None:
 
 
 def _whole_ticks(axes: Axes, actions: Floats) -> None:
+    """Put a tick at each discrete action, if there are not too many of them."""
     numbers = np.unique(actions)
     if len(numbers) <= MOST_COLORS:
         axes.set_yticks(numbers)
@@ -268,6 +269,7 @@ def draw_replay(
 
 
 def _name_strip(panel: Axes, name: str) -> None:
+    """Write what a panel of an episode shows above it, in small letters."""
     style(panel)
     panel.tick_params(labelsize=7.5)
     panel.set_title(name, loc="left", fontsize=8.5, color=FAINT, pad=2)

@@ -96,6 +96,7 @@ def _allowed_on(
 
 
 def _axis(agent_input: AgentInput, states: Floats, n_points: int) -> Floats:
+    """Return the numbers of an input on a map: its symbols, or n points of its range."""
     if agent_input.has_symbols:
         return np.unique(agent_input.numbers(states))
     return np.linspace(*agent_input.limits(states), n_points)

@@ -18,7 +18,6 @@ from sdnn.cli.common import (
     errors_in_a_line,
     exit_interrupted,
     make_console,
-    rendered,
 )
 from sdnn.reproduction.cases import MOST_EPISODES, WORDS
 from sdnn.support.arguments import blamed
@@ -84,7 +83,7 @@ def study_command(make_study: Callable[..., Study]) -> Function:
         """Run the study that the options describe, print its results, and exit with a status."""
         from rich.console import Console
 
-        from sdnn.reports.pages import duration_words
+        from sdnn.reports.pages import duration_words, rendered
         from sdnn.runs.engine import TrialBars
         from sdnn.runs.sweep import forecast, run_study
 
@@ -103,7 +102,7 @@ def study_command(make_study: Callable[..., Study]) -> Function:
                 text = json.dumps(estimate, indent=2)
                 if not as_json:
                     values = {"out": out, "duration": duration_words, **estimate}
-                    text = rendered("forecast.txt.jinja", **values)
+                    text = rendered("sdnn.cli", "forecast.txt.jinja", **values).rstrip("\n")
                 click.echo(text, nl=bool(text))
                 return
             with TrialBars(Console(stderr=True)) as observer:

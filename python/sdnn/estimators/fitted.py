@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from inspect import get_annotations
 from pathlib import Path
 from typing import Any, Self
 
@@ -26,7 +27,7 @@ NAMES = ("classes_", "feature_names_in_")  # arrays whose type may be text
 
 
 class Learned(BaseEstimator):
-    """Base of estimators: the attributes that files hold unchanged."""
+    """Base of estimators: the attributes that files hold unchanged, in their order there."""
 
     n_corrected_: NDArray[np.int64]
     n_features_in_: int
@@ -37,40 +38,23 @@ class Learned(BaseEstimator):
     output_range_: Floats
     training_form_: str
     training_memory_: int
+    validation_scores_: Floats
+    _counts_of_range: int  # units per output, which divide its range
+    _flat: bool  # whether targets have one dimension
+    _n_units_each: int  # units per class
+    _n_weighted: int  # weighted samples that partial_fit has received
+    _scheme: str
+    _weight_seed: int
     held_out_counts_: Floats
     held_out_residuals_: Floats
     steepness_: float
-    validation_scores_: Floats
-    _counts_of_range: int
-    _flat: bool
-    _n_units_each: int
-    _n_weighted: int
-    _scheme: str
-    _weight_seed: int
 
 
 ATTRIBUTES: dict[str, type] = {
-    "n_corrected_": np.ndarray,
-    "n_features_in_": int,
-    "n_inputs_out_of_range_": int,
-    "n_iter_": int,
-    "n_outputs_": int,
-    "n_outputs_out_of_range_": int,
-    "output_range_": np.ndarray,
-    "training_form_": str,
-    "training_memory_": int,
-    "validation_scores_": np.ndarray,
-    "_counts_of_range": int,
-    "_flat": bool,
-    "_n_units_each": int,
-    "_n_weighted": int,
-    "_scheme": str,
-    "_weight_seed": int,
-    "held_out_counts_": np.ndarray,
-    "held_out_residuals_": np.ndarray,
-    "steepness_": float,
+    name: hint if isinstance(hint, type) else np.ndarray
+    for name, hint in get_annotations(Learned, eval_str=True).items()
 }
-"""Types of the attributes of `Learned` as a file has them; annotations are not read at run time."""
+"""Types of the attributes of `Learned` as a file has them."""
 
 
 class Fitted(Learned):
@@ -83,10 +67,11 @@ class Fitted(Learned):
     verbose: int
     network_: Network
     _earlier: tuple[Network, ...] = ()
-    _n_weighted = 0  # number of weighted samples that partial_fit has received
+    _n_weighted = 0
 
     @property
     def _fitted_network(self) -> Network:
+        """The network; NotFittedError before the first fit."""
         if "network_" not in self.__dict__:  # scikit-learn's check takes as long as small networks
             check_is_fitted(self, "network_")
         return self.network_

@@ -9,6 +9,7 @@ import numpy as np
 from sdnn import _core
 from sdnn.coding import Coding, RandomInverse, WithMissing
 from sdnn.coding.kernel import N_UNITS, AnalyticKernel
+from sdnn.coding.symbols import present
 from sdnn.estimators.bins import InputBins
 from sdnn.estimators.columns import Array, Floats, Ints
 from sdnn.estimators.ridge import apply_degree, row_blocks
@@ -78,12 +79,10 @@ def correlations_of(coding: Coding) -> Floats:
 
     They are those of the first bin, if they fall by a factor from bin to bin, or those of all bins.
     """
-    base = coding.base if isinstance(coding, WithMissing) else coding
-    matrix = base.correlations(N_UNITS)
-    correlations = matrix
-    if type(base) is RandomInverse and matrix[0].min() > LEAST_POWER:
-        correlations = matrix[0]
-    if not isinstance(coding, WithMissing):
+    base = present(coding)
+    correlations = base.correlations(N_UNITS)
+    if type(base) is RandomInverse and correlations[0].min() > LEAST_POWER:
+        correlations = correlations[0]
+    if base is coding:
         return correlations
-    padding = [(0, 1)] * correlations.ndim  # a missing value correlates with no other
-    return np.pad(correlations, padding)
+    return np.pad(correlations, (0, 1))  # a missing value correlates with no other

@@ -120,23 +120,23 @@ class Page:
 
     def to_markdown(self) -> str:
         """Return the page in Markdown, without figures."""
-        return self._render("page.md.jinja")
+        return rendered("sdnn.reports", "page.md.jinja", page=self)
 
     def to_html(self, call: str) -> str:
         """Return the page as self-contained HTML; `call` is the command that made it."""
-        return self._render("page.html.jinja", call=call)
+        return rendered("sdnn.reports", "page.html.jinja", page=self, call=call)
 
-    def _render(self, name: str, **values: str) -> str:
-        """Fill the template `name` with the page; HTML is escaped."""
-        from jinja2 import Environment, PackageLoader, StrictUndefined
 
-        environment = Environment(
-            loader=PackageLoader("sdnn.reports", "."), autoescape=".html." in name,
-            undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
-            keep_trailing_newline=True,
-        )  # fmt: skip
-        environment.filters["markdown"] = markdown_text
-        return environment.get_template(name).render(page=self, **values)
+def rendered(package: str, template: str, **values: object) -> str:
+    """Fill in a template of a package of this library; HTML is escaped."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader(package, "."), autoescape=".html." in template,
+        undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
+    )  # fmt: skip
+    environment.filters["markdown"] = markdown_text
+    return environment.get_template(template).render(values)
 
 
 def markdown_text(text: str) -> str:
