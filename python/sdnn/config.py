@@ -45,8 +45,6 @@ class Field(NamedTuple):
 def fields_of(config_class: object) -> tuple[Field, ...]:
     """Return the settings of a class of the core, or none for any other class.
 
-    Examples
-    --------
     >>> [field.name for field in fields_of(FuzzyRulesConfig)]
     ['n_inputs', 'n_sets', 'n_actions', 'max_table_bytes']
     """

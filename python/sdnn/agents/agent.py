@@ -42,8 +42,7 @@ from sdnn.training.training import (
 if TYPE_CHECKING:
     from sdnn.reports.plots import Figure
 
-_MOST_OBSERVED = 16
-"""The most numeric inputs of an observer."""
+_MOST_OBSERVED = 16  # the most numeric inputs of an observer
 
 
 class Agent(Displayed, BaseAgent[Approximator, Learning]):

@@ -31,8 +31,7 @@ from sdnn.support.files import open_regular
 from sdnn.support.habits import advice
 from sdnn.training.interfaces import Transition, explained
 
-_MOST_BYTES = 2**20
-"""Limit of a line's length when a file is read, so that memory stays bounded."""
+_MOST_BYTES = 2**20  # limit of a line's length when a file is read, so that memory stays bounded
 
 NAMES: Mapping[str, tuple[str, ...]] = {
     "observations": ("observation", "obs", "states", "state"),
@@ -123,9 +122,10 @@ def _table_lines(path: Path) -> Iterator[tuple[str, Data]]:
 def _with_next_observations(
     rows: Iterable[tuple[str, Data]], *, is_episode: bool = False
 ) -> Iterator[Logged]:
-    """Convert rows to transitions; a missing next observation is that of the next row.
+    """Convert rows, of one or several episodes, to transitions.
 
-    The last step of a truncated episode then has no next observation, and is left out.
+    A missing next observation is that of the next row. So the last step of a truncated episode has
+    none, and is left out, unless the rows have the episode's last observation (`is_episode`).
     """
     pending: tuple[Data, str] | None = None  # the last row and its place, without that observation
     for place, row in rows:
@@ -251,7 +251,8 @@ def _flag(name: str, value: Any) -> bool:
 def _columns_of(values: Info, where: str = "dataset", *, is_episode: bool = False) -> Data:
     """Return arrays of n rows by their usual names; ``observations`` may have n + 1 rows.
 
-    Columns such as ``observation_0`` are put together. Memory-mapped arrays stay on disk.
+    Those of an episode (`is_episode`) must have n + 1. Columns such as ``observation_0`` are put
+    together. Memory-mapped arrays stay on disk.
     """
     columns: Data = {}
     numbered_columns: dict[str, dict[int, Any]] = {}  # such as observation_0, by name and number
@@ -312,7 +313,10 @@ def _n_rows_of(column: Any) -> int:
 
 
 def _rows(columns: Data, place: str, *, is_episode: bool = False) -> Iterator[tuple[str, Data]]:
-    """Yield the rows of arrays with their places; last, an observation that follows them."""
+    """Yield the rows of arrays with their places; last, an observation that follows them.
+
+    The last step of an episode (`is_episode`) is truncated, unless it terminates.
+    """
     n, has_next = _n_rows_of(columns["rewards"]), "next_observations" in columns
     for i in range(n if has_next else _n_rows_of(columns["observations"])):
         names = columns if i < n else ("observations",)

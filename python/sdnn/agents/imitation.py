@@ -17,8 +17,7 @@ from sdnn.training.interfaces import Transition, explained
 LinearAgent: TypeAlias = SDNNQLambda | SDNNActorCritic
 Steps: TypeAlias = Sequence[Transition]
 
-_MOST_STEPS = 10_000
-"""The number of steps that are in memory at once; longer episodes are split."""
+_MOST_STEPS = 10_000  # the number of steps that are in memory at once; longer episodes are split
 
 
 @explained

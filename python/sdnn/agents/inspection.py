@@ -26,14 +26,11 @@ Flags: TypeAlias = NDArray[np.bool_]
 AnyAgent: TypeAlias = BaseAgent[Any, Any]
 InputType: TypeAlias = Literal["variable", "circular", "angle", "symbol"]
 
-MOST_STATES = 1_000
-"""Largest number of states from which influences are estimated."""
+MOST_STATES = 1_000  # largest number of states from which influences are estimated
 MOST_READS, MOST_SLOW_READS = 40_000, 10_000
 """Number of reads for influences, and of agents with slower networks: inputs share them."""
-MOST_STEPS = 2_000
-"""Steps in which states are met."""
-SHARE_RANDOM = 0.1
-"""Share of random actions with which states are met beside the greedy path."""
+MOST_STEPS = 2_000  # steps in which states are met
+SHARE_RANDOM = 0.1  # share of random actions with which states are met beside the greedy path
 N_SHUFFLES = 2
 
 
@@ -66,8 +63,8 @@ class AgentInput:
             return symbols.astype(np.float64)
         return values[:, 0]
 
-    def place(self, states: Floats, numbers: Floats) -> None:
-        """Write numbers, as `numbers` returns them, into states, in place."""
+    def write(self, states: Floats, numbers: Floats) -> None:
+        """Write numbers, as `numbers` returns them, into the columns of states."""
         if self.type == "angle":
             radians = np.radians(numbers)
             states[:, list(self.columns)] = np.stack([np.cos(radians), np.sin(radians)], axis=1)
@@ -198,10 +195,7 @@ class Reading(NamedTuple):
 class Reader:
     """Reads values and greedy actions of states from an agent, and changes nothing that it learned.
 
-    Parameters
-    ----------
-    agent
-        One that is not warming up; RuntimeError else.
+    RuntimeError while the agent is warming up.
     """
 
     def __init__(self, agent: AnyAgent) -> None:

@@ -57,11 +57,11 @@ def map_of(
     for agent_input in inputs:
         if agent_input not in chosen:
             number = agent_input.typical(met)
-            agent_input.place(rows, np.full(len(rows), number))
+            agent_input.write(rows, np.full(len(rows), number))
             if agent_input.is_used:
                 typical[agent_input.name] = number
     for agent_input, grid in zip(chosen, grids, strict=True):
-        agent_input.place(rows, grid.ravel())
+        agent_input.write(rows, grid.ravel())
     reading = reader.read(States(rows, _allowed_on(axes, chosen, states)))
     return StateMap(
         tuple(chosen),

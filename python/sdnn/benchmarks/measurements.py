@@ -42,8 +42,7 @@ N_THREADS = 2
 N_CORRECTED = 5
 """Units corrected by the learning steps that are timed: the mean over those that correct any."""
 SELECTIONS_PER_REPETITION = 100
-N_COLD = 2
-"""First repetitions of a turn, which refill the caches after other measurements."""
+N_COLD = 2  # first repetitions of a turn, which refill the caches after other measurements
 
 
 @dataclass(frozen=True)
@@ -201,6 +200,7 @@ def measure_threads(n_inputs: int, noise: float, effort: Effort) -> dict[str, ob
     """
 
     def advance(trial: _core.AcrobotTrial) -> float:
+        """Run a trial to its end; return its processor time."""
         begin = time.thread_time()
         trial.advance(effort.n_episodes)
         return time.thread_time() - begin

@@ -24,8 +24,7 @@ if TYPE_CHECKING:
 Options: TypeAlias = dict[str, Any]
 """The options of a command by their names."""
 
-PLAIN_WIDTH = 160
-"""Width of tables that go to a file or pipe."""
+PLAIN_WIDTH = 160  # width of tables that go to a file or pipe
 
 KEYS = (
     "agent.name", "agent.preset", "budget.steps", "budget.episodes", "budget.target_return", "seed",
@@ -192,7 +191,7 @@ def train_run(
     run: Run, as_json: bool, *, steps: int | None = None, episodes: int | None = None,
     repeat_episodes: bool = True,
 ) -> None:  # fmt: skip
-    """Train a run with a progress bar on terminals; print the result and how to continue."""
+    """Train a run with a bar on terminals; print the result, in words or as JSON (`as_json`)."""
     from sdnn.reports.pages import rendered
     from sdnn.runs.run import resume_command
     from sdnn.training.training import shows_bar

@@ -249,7 +249,7 @@ def _errors_of_options(name: str | None, **options: str) -> Iterator[None]:
 def _words(
     path: Path, header: CHeader | EstimatorHeader, learning: bool, more: Data | None = None
 ) -> str:
-    """Describe a header that was written: in a line, or with ``more`` as JSON."""
+    """Describe a header, whose agent may learn: in a line, or as JSON with the values ``more``."""
     if more is not None:
         values = {k: v for k, v in dataclasses.asdict(header).items() if k != "text"}
         return json_text({"file": str(path), **values, **more})

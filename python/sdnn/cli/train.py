@@ -50,12 +50,12 @@ def _options() -> list[click.Option]:
             table = next(part["$ref"] for part in alternatives if "$ref" in part).rpartition("/")[2]
             schema = schemas[table]["properties"][name]
         types = (part for part in schema.get("anyOf", ()) if part.get("type") != "null")
-        kind = next(types, schema)
-        is_flag, default = kind.get("type") == "boolean", schema.get("default")
+        value_schema = next(types, schema)
+        is_flag, default = value_schema.get("type") == "boolean", schema.get("default")
         default_text = "" if default is None or is_flag else f"  [default: {default}]"
         option = click.Option(
             [option_of(key), key.replace(".", "_")],
-            type=None if is_flag else _option_type(kind),
+            type=None if is_flag else _option_type(value_schema),
             is_flag=is_flag,
             default=None,
             help=schema["description"].replace("`", "") + default_text,
@@ -64,14 +64,14 @@ def _options() -> list[click.Option]:
     return options
 
 
-def _option_type(kind: Mapping[str, Any]) -> click.ParamType[Any]:
+def _option_type(schema: Mapping[str, Any]) -> click.ParamType[Any]:
     """Return Click's type for a setting's JSON Schema; 2^53 is the maximum of any whole number."""
-    low, high = kind.get("minimum"), kind.get("maximum")
-    if "enum" in kind:
-        return click.Choice([word for word in kind["enum"] if word is not None])
-    if kind.get("type") == "integer":
+    low, high = schema.get("minimum"), schema.get("maximum")
+    if "enum" in schema:
+        return click.Choice([word for word in schema["enum"] if word is not None])
+    if schema.get("type") == "integer":
         return click.IntRange(low, None if high == 2**53 else high)
-    if kind.get("type") == "number":
+    if schema.get("type") == "number":
         return click.FLOAT if low is None else click.FloatRange(low, high)
     return click.STRING
 
@@ -207,10 +207,8 @@ def _options_by_key(env_id: str | None, options: Options) -> Options:
 def _named_range(text: str) -> tuple[str, list[float]]:
     """Return variable, or "all", and bounds of [VARIABLE=]LOW:HIGH."""
     name, _, bounds = text.rpartition("=")
-    low, colon, high = bounds.partition(":")
+    low, _, high = bounds.partition(":")  # without a colon `high` is empty, which is no number
     try:
-        if not colon:
-            raise ValueError
         return name or "all", [float(low), float(high)]
     except ValueError:
         raise click.UsageError(

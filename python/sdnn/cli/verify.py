@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from sdnn.runs.reported import Consent, Reports
     from sdnn.runs.verification import Verification
 
-MOST_NOTES = 8
-"""Largest number of settings that are listed as other than the paper's."""
+MOST_NOTES = 8  # largest number of settings that are listed as other than the paper's
 
 
 @click.command(short_help="Run trials of someone's results again, and compare every bit.")

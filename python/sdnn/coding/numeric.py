@@ -210,9 +210,8 @@ class RandomInverse(Ranged):
 
     def correlations(self, n_units: int) -> NDArray[np.float64]:
         """Return how patterns of two bins correlate: a constant to the power of their distance."""
-        of_distances = np.power(
-            1 - 4 * fitted_field(self.n_flipped) / n_units, np.arange(self.size)
-        )
+        of_neighbours = 1 - 4 * fitted_field(self.n_flipped) / n_units
+        of_distances = np.power(of_neighbours, np.arange(self.size))
         # A strided view: all entries of a diagonal are equal.
         both_ways = np.concatenate([of_distances[:0:-1], of_distances])
         return np.lib.stride_tricks.sliding_window_view(both_ways, self.size)[::-1]
@@ -241,18 +240,21 @@ class Anchored(Coding):
 
     def correlations(self, n_units: int) -> NDArray[np.float64]:
         """Return how patterns of two bins correlate, by the anchors between which they lie."""
-        # Between the same two anchors the correlation falls linearly with the distance. Patterns on
-        # two sides of an anchor correlate by the product of their shares of that anchor.
-        n_stretches, n_portions = self.n_anchor_patterns - 1, self.n_interpolated + 1
-        stretch, portion = np.divmod(np.arange(self.size), n_portions)
-        share = portion / n_portions
+        # A stretch reaches from an anchor to the next one. Within it the correlation falls linearly
+        # with the distance. Patterns on two sides of an anchor correlate by the product of their
+        # shares of that anchor.
+        n_stretches, n_bins = self.n_anchor_patterns - 1, self.n_interpolated + 1
+        stretch, number = np.divmod(
+            np.arange(self.size), n_bins
+        )  # of each bin, and its number in it
+        share = number / n_bins  # share of the next anchor in the bin's pattern
         step = np.subtract.outer(stretch, stretch)
-        same = 1 - np.abs(np.subtract.outer(share, share))
+        within = 1 - np.abs(np.subtract.outer(share, share))
         across = np.multiply.outer(1 - share, share)
         if self.is_circular and n_stretches == 1:
-            return np.ones_like(same)  # a circle with a single anchor: all patterns are equal
+            return np.ones_like(within)  # a circle with a single anchor: all patterns are equal
         is_next = step % n_stretches == 1 if self.is_circular else step == 1
-        result: NDArray[np.float64] = (step == 0) * same + is_next * across + is_next.T * across.T
+        result: NDArray[np.float64] = (step == 0) * within + is_next * across + is_next.T * across.T
         return result
 
 

@@ -49,9 +49,7 @@ class Categorical(Coding):
         if not isinstance(categories, Iterable) or isinstance(categories, str | bytes):
             raise ValueError(f"categories must be a tuple of values, got {shown(categories)}")
         object.__setattr__(self, "categories", tuple(categories))
-        are_hashable = all(
-            isinstance(category, Hashable) for category in fitted_field(self.categories)
-        )
+        are_hashable = all(isinstance(category, Hashable) for category in self.categories or ())
         require(are_hashable, "categories", "be words or numbers", self.categories)
 
     @property
@@ -64,9 +62,8 @@ class Categorical(Coding):
 
     def bins(self, column: Column) -> NDArray[np.int32]:
         """Return the number of each value's category; ValueError lists unknown values."""
-        numbers = {
-            category: number for number, category in enumerate(fitted_field(self.categories))
-        }
+        categories = fitted_field(self.categories)
+        numbers = {category: number for number, category in enumerate(categories)}
         try:
             return np.array([numbers[value] for value in column.tolist()], dtype=np.int32)
         except (KeyError, TypeError):
@@ -100,8 +97,8 @@ class Categorical(Coding):
         try:
             return tuple(sorted(set(values)))
         except TypeError:
-            message = "the categories of an input must be all words or all numbers"
-            raise ValueError(message) from None
+            problem = "the categories of an input must be all words or all numbers"
+            raise ValueError(problem) from None
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -187,7 +187,7 @@ class AcrobotSwingUpEnv(gym.Env[Array, ArrayLike]):
         self._pictures += [picture for picture in pictures if picture is not None]
 
     def _draw(self, state: NDArray[np.float64], solved: bool) -> NDArray[np.uint8] | None:
-        """Draw the acrobot in the window, or return its picture."""
+        """Draw a state, perhaps at the goal (`solved`), in the window, or return its picture."""
         if self._picture is None:
             fps = self.metadata["render_fps"] if self.render_mode == "human" else None
             self._picture = AcrobotPicture(self.config, fps)

@@ -96,7 +96,8 @@ class AcrobotPicture:
     ) -> NDArray[np.uint8] | None:
         """Return the picture, shape (500, 500, 3), or None if it went to the window.
 
-        The torque (N m) is the last one held, ``decision`` the number of decisions made.
+        The torque (N m) is the last one held, ``decision`` the number of decisions made, ``solved``
+        whether the goal is reached, which is written.
         """
         pygame = self._pygame
         hanging = state[0] - math.pi / 2, state[0] + state[1] - math.pi / 2
@@ -149,7 +150,7 @@ class AcrobotPicture:
         self._canvas.blit(drawn, (left, y * _FINE))
 
     def _draw_background(self, solved: bool) -> None:
-        """Draw the reach of the links, the dashed line of the goal and its label."""
+        """Draw the reach of the links, and the goal: a label and a dashed line, thick if solved."""
         draw = self._pygame.draw
         draw.circle(self._canvas, _FAINT, self._pixel(0j), self._reach * self._scale, _FINE)
         y = self._pixel(self._config.goal_height * 1j)[1]

@@ -196,12 +196,9 @@ _WAYS_OUT = {
     " agent.action_space.high) scales them; where the units are the same,"
     " gymnasium.wrappers.TransformAction(env, lambda action: action, agent.action_space)",
 }
-_ROUNDING = 1e-5
-"""Bounds whose relative difference is at most this are equal apart from rounding."""
-_MOST_SHOWN = 3
-"""Largest number of variables that a message lists."""
-_MOST_CHARACTERS = 60
-"""The longest description of a space."""
+_ROUNDING = 1e-5  # bounds whose relative difference is at most this are equal apart from rounding
+_MOST_SHOWN = 3  # largest number of variables that a message lists
+_MOST_CHARACTERS = 60  # the longest description of a space
 
 
 def made(name: str, env_id: str) -> Env:
@@ -260,6 +257,7 @@ def require_unbatched(observations: Space, actions: Space) -> None:
 
 
 def _has_equal_rows(space: Space) -> bool:
+    """Return whether a space is a Box of rows with equal bounds, as of a vector environment."""
     if not isinstance(space, gym.spaces.Box) or len(space.shape) < 2:
         return False
     return bool((space.low == space.low[:1]).all() and (space.high == space.high[:1]).all())
@@ -281,12 +279,7 @@ def require_same_kind(agent: object, env: object, argument: str = "env") -> None
     a Box are the same but for rounding, as other bounds are other units; types are not compared.
     Where the agent's run scaled its observations, the environment must scale them, too. An
     environment without spaces is not checked, nor are bounds for an agent made in C++, whose spaces
-    are its ranges. ``argument`` is the name of ``env`` in errors.
-
-    Raises
-    ------
-    ValueError
-        If it does not fit.
+    are its ranges. ValueError if it does not fit, with the name ``argument`` for the environment.
     """
     scaling = getattr(agent, "scaling", None)
     if scaling is not None and not _is_unit(_space_of(env, "observation_space")):
@@ -346,20 +339,18 @@ def _bounds(space: Any) -> NDArray[np.float64]:
 
 def require_same_variables(space: Space, other_space: Space) -> None:
     """Check that a space can replace an agent's: all but bounds are the same; else ValueError."""
+    are_same = _can_observe(space, other_space) and _can_observe(other_space, space)
     expected = f"have the variables of {in_a_line(space)}"
-    require(
-        _can_observe(space, other_space) and _can_observe(other_space, space),
-        "observation_space",
-        expected,
-        other_space,
-    )
+    require(are_same, "observation_space", expected, other_space)
 
 
 def _space_of(env: object, name: str) -> Any:
+    """Return a space of an environment, or of each in a vector; None if it has none."""
     return getattr(env, f"single_{name}", getattr(env, name, None))
 
 
 def _is_unit(space: Space | None) -> bool:
+    """Return whether a space is a Box within [0, 1], or not known."""
     if not isinstance(space, gym.spaces.Box):
         return space is None
     return bool((space.low >= 0.0).all() and (space.high <= 1.0).all())
@@ -386,6 +377,7 @@ def _can_observe(space: Space, other_space: Space) -> bool:
 
 
 def _has_equal_actions(space: Space, other_space: Space) -> bool:
+    """Return whether spaces have the same discrete actions, or as many continuous dimensions."""
     if isinstance(space, gym.spaces.Box) and isinstance(other_space, gym.spaces.Box):
         return space.low.size == other_space.low.size
     bounds = integer_bounds(space)

@@ -35,15 +35,8 @@ _MANY_VARIABLES = 16
 class Observations:
     """The variables of an observation space, flattened as Gymnasium does it.
 
-    Parameters
-    ----------
-    space : gymnasium.Space
-        Box, Discrete, MultiDiscrete, MultiBinary, Dict or Tuple.
-
-    Raises
-    ------
-    TypeError, ValueError
-        For a space that is no vector when flattened, or has no variable.
+    It may be a Box, Discrete, MultiDiscrete, MultiBinary, Dict or Tuple. TypeError or ValueError if
+    it is no vector when flattened, or has no variable.
     """
 
     def __init__(self, space: Space) -> None:
@@ -65,7 +58,10 @@ class Observations:
         history: History = "none",
         narrows: bool = False,
     ) -> _core.ObservationConfig:
-        """Return the core's settings for these arguments of `sdnn.agents.Agent`."""
+        """Return the core's settings for these arguments of `sdnn.agents.Agent`.
+
+        ``narrows``: the warm-up replaces bounds of the space that are far wider than observations.
+        """
         rule = ranges if isinstance(ranges, str) and ranges in ("adaptive", "running") else None
         low, high = self._low, self._high
         if rule == "running":  # bounds have no effect, and equal bounds would be refused
@@ -133,11 +129,11 @@ def has_mask(space: Space, observation: Element) -> bool:
     return any(isinstance(row, np.ma.MaskedArray) for row in rows)
 
 
-def _readings(name: str, values: Any, kinds: str = "fiub") -> Array:
+def _readings(name: str, values: Any) -> Array:
     """Return numbers as an array, with NaN for masked ones; ValueError for others."""
     rows = values if isinstance(values, list | tuple) else [values]
     if not any(isinstance(row, np.ma.MaskedArray) for row in rows):
-        return array_of(name, values, kinds)
+        return array_of(name, values)
     masked: Any = np.ma.array(values)
     require(masked.dtype.kind in "fiub", name, "be numbers", values)
     is_complete = not np.ma.is_masked(masked)
@@ -166,18 +162,15 @@ def _flat_parts(space: Space, observation: Element) -> Iterator[Array]:
             if is_read.all() and values.dtype.kind == "f":
                 raise ValueError("must be whole numbers")
             sizes = space.n if isinstance(space, gym.spaces.Discrete) else space.nvec
-            steps = np.where(is_read, values, space.start) - space.start
-            if not ((steps >= 0) & (steps < sizes) & (steps == np.floor(steps))).all():
+            symbols = np.where(is_read, values, space.start) - space.start  # from 0
+            if not ((symbols >= 0) & (symbols < sizes) & (symbols == np.floor(symbols))).all():
                 raise ValueError(f"must be in {space}")
-            triples = zip(np.ravel(steps), np.ravel(is_read), np.ravel(sizes), strict=True)
-            for step, was_read, size in triples:
-                one_hot = np.full(size, 0.0 if was_read else np.nan)
-                if was_read:
-                    one_hot[int(step)] = 1.0
-                yield one_hot
+            triples = zip(np.ravel(symbols), np.ravel(is_read), np.ravel(sizes), strict=True)
+            for symbol, was_read, size in triples:  # one-hot, or NaN for a missing symbol
+                yield np.eye(1, size, int(symbol))[0] if was_read else np.full(size, np.nan)
             return
         is_whole = np.dtype(space.dtype).kind in "iub" and np.isfinite(values).all()
-        is_cast = is_whole or np.dtype(space.dtype).kind == "f"
+        is_cast = is_whole or np.dtype(space.dtype).kind == "f"  # integers have no NaN
         yield (values.astype(space.dtype) if is_cast else values).reshape(-1)
 
 
@@ -202,17 +195,8 @@ def _ranges(
         is_pair = isinstance(ranges, Sequence) and not isinstance(ranges, str) and len(ranges) == 2
         require(is_pair, "observation_range", "be (low, high), 'adaptive' or 'running'", ranges)
         try:
-            low, high = (
-                with_infinities(
-                    np.broadcast_to(
-                        array_of("observation_range", end)
-                        .astype(np.float64, copy=False)
-                        .reshape(-1),
-                        low.shape,
-                    )
-                )
-                for end in ranges
-            )
+            ends = [array_of("observation_range", end).reshape(-1) for end in ranges]
+            low, high = (with_infinities(np.broadcast_to(end, low.shape)) for end in ends)
         except ValueError:
             raise ValueError(
                 f"observation_range must be two numbers or two times {low.size},"
@@ -235,20 +219,9 @@ def _ranges(
 class Actions:
     """The numbers of an action space: a row of them for each action.
 
-    Parameters
-    ----------
-    space : gymnasium.Space
-        Box with finite bounds, Discrete, MultiDiscrete or MultiBinary; TypeError for others.
-
-    Attributes
-    ----------
-    is_box : bool
-    n_actions : list of int
-        Of each dimension that is not a Box's.
-    config : ActionConfig
-        The core's settings.
-    has_masks : bool
-        Whether an agent explored or learned with a mask.
+    The space is a Box with finite bounds, Discrete, MultiDiscrete or MultiBinary; TypeError for
+    others. ``n_actions`` are those of each dimension, if the space is no Box, ``config`` are the
+    core's settings. ``has_masks`` is whether an agent explored or learned with a mask.
     """
 
     def __init__(self, space: Space) -> None:

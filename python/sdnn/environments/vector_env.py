@@ -171,10 +171,12 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[Array, ArrayLike, Array]):
 
     def _reset_mask(self, mask: ArrayLike | None) -> NDArray[np.bool_]:
         """Return which environments to reset: all of them unless the option selects some."""
-        name = "options['reset_mask']"
-        chosen = np.ones(self.num_envs, np.bool_) if mask is None else array_of(name, mask, "b")
+        if mask is None:
+            return np.ones(self.num_envs, np.bool_)
+        chosen = array_of("options['reset_mask']", mask, "b")
+        fits = chosen.shape == (self.num_envs,) and chosen.any()
         expected = f"be a bool array of shape ({self.num_envs},) with at least one True"
-        require(chosen.shape == (self.num_envs,) and chosen.any(), name, expected, mask)
+        require(fits, "options['reset_mask']", expected, mask)
         return chosen
 
     def _tolerances_of(self, values: ArrayLike) -> NDArray[np.float64]:

@@ -160,7 +160,7 @@ class BaseSDNN(Fitted, CodedInputs):
     def _check_samples(
         self, X: object, y: object, codings: Sequence[Coding] | None, in_fit: bool = False
     ) -> tuple[Array, Array]:
-        """Return samples and targets, checked as by `_validated`."""
+        """Return samples and targets, checked as by `_validated`; `fit` needs two labels."""
 
     @abc.abstractmethod
     def _set_outputs(self, y: ArrayLike) -> int:
@@ -172,7 +172,10 @@ class BaseSDNN(Fitted, CodedInputs):
 
     @abc.abstractmethod
     def _targets(self, y: Array, at_once: bool = False) -> Array:
-        """Return firing counts or class numbers for targets; may widen the output range."""
+        """Return firing counts or class numbers for targets; may widen the output range.
+
+        ``at_once``: by all targets before any is converted, instead of by one after the other.
+        """
 
     @abc.abstractmethod
     def _rule_arguments(self, targets: Array) -> Rule:
@@ -227,8 +230,7 @@ class BaseSDNN(Fitted, CodedInputs):
             in_blocks = self.shuffle and times is None and n_samples > LARGE_SAMPLE
             if in_blocks:
                 rows = random.permutation(rows)
-            # The block form reuses the sums of blocks that are presented again, and is chosen for
-            # few epochs.
+            # The trainer's block form reuses sums of blocks; it is chosen for few epochs only.
             n_epochs = min(max_iter, 2) if in_blocks else max_iter
             learned = self._targets_to_learn(bins[rows], targets[rows], weights_of_rows)
             # Networks that learn a part of very many samples correct half the share.
@@ -316,7 +318,11 @@ class BaseSDNN(Fitted, CodedInputs):
         n_networks: int = 1,
         is_large: bool = False,
     ) -> np.random.RandomState:
-        """Fit the codings, draw tables and weights; return the generator that shuffles samples."""
+        """Fit the codings, draw tables and weights; return the generator that shuffles samples.
+
+        ``pairs`` are those that were selected, ``n_networks`` are to be kept. ``is_large`` takes
+        fewer units per pattern.
+        """
         n_units = self._set_outputs(y)
         codings = self._codings(X, table)
         random: np.random.RandomState = check_random_state(self.random_state)

@@ -40,9 +40,9 @@ def learn_without_fifth(
 ) -> HeldOut:
     """Train a model like a fitted one without a fifth of the samples.
 
-    It has the same codings and pairs. A class of a single sample is not held out.
-    TooFewSamplesError for fewer than ten samples, too few for early stopping, or too few of each
-    class.
+    It has the same codings and pairs. With ``is_stratified`` a fifth of each class is held out, but
+    no class of a single sample. TooFewSamplesError for fewer than ten samples, too few for early
+    stopping, or too few of each class.
     """
     targets = np.asarray(y)
     if len(targets) < FEWEST_SAMPLES:

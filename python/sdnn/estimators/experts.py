@@ -94,8 +94,8 @@ class LinearColumns:
             if (value := sample.get(name)) is not None:
                 row[column] = value
         for name, columns in self.categories.items():
-            if (place := columns.get(sample.get(name))) is not None:
-                row[place] = 1.0
+            if (column_of_category := columns.get(sample.get(name))) is not None:
+                row[column_of_category] = 1.0
         return np.array(row, dtype=np.float64)
 
 
@@ -104,14 +104,8 @@ class Experts(abc.ABC):
 
     With a window there is kernel regression too, of what the first linear regression leaves.
 
-    Parameters
-    ----------
-    codings : dict of str to Coding
-        Fitted codings of all features.
-    rows : list of dict
-        Last samples, as `StreamEstimator` reads them.
-    targets : ndarray, shape (n_samples, n_outputs)
-    has_window : bool
+    ``codings`` are fitted, by feature; ``rows`` are the last samples, as `StreamEstimator` reads
+    them, with their targets, shape (n_samples, n_outputs).
     """
 
     first: str  # name of the first expert

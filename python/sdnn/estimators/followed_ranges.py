@@ -16,12 +16,8 @@ FARTHEST = 1e300  # largest distance of a value from the range, in widths
 class FollowedRanges:
     """Moves numbers from their range among the last samples to the range that a model learned.
 
-    Parameters
-    ----------
-    ranges : dict of str to (float, float)
-        The learned range of each feature to follow.
-    first : DataFrame
-        The samples from which the ranges were learned.
+    ``ranges`` are the learned ranges (low, high) of the features to follow, ``first`` the samples
+    from which they were learned.
     """
 
     def __init__(self, ranges: Mapping[str, tuple[float, float]], first: pd.DataFrame) -> None:
@@ -32,7 +28,7 @@ class FollowedRanges:
         last = np.clip(values[-WINDOW:], self.low, self.high)
         self.recent[: len(last)] = last
         self.n_noted = len(last)
-        self.now = self.low, self.high
+        self.now = self.low, self.high  # the range of the last samples, to be mapped to the learned
 
     def extend(self, ranges: Mapping[str, tuple[float, float]], last: pd.DataFrame) -> None:
         """Follow more features, whose ranges were learned from the last samples."""
@@ -54,7 +50,10 @@ class FollowedRanges:
             self.now = np.where(is_range, low, self.now[0]), np.where(is_range, high, self.now[1])
 
     def moved(self, x: dict[str, object], learns: bool) -> dict[str, object]:
-        """Map a sample's finite numbers from the range of the window to the learned range."""
+        """Map a sample's finite numbers from the range of the window to the learned range.
+
+        With `learns` the sample is added to the window first.
+        """
         try:
             values = np.array([x.get(name) for name in self.names], dtype=np.float64)
         except (TypeError, ValueError):

@@ -146,18 +146,9 @@ class Candidate:
 class InputChoice:
     """Solves the ridge problem of some samples with different inputs, and compares the errors.
 
-    Parameters
-    ----------
-    codings
-        Of the features, fitted.
-    table
-        Features of all samples.
-    samples
-        Their targets and weights.
-    degrees
-        Degrees of the kernel to choose from, once, with all inputs.
-    losses
-        Gives each sample's loss, shape (n_samples,), from the output without it.
+    ``codings`` of the features are fitted; ``table`` has the features of all samples, ``samples``
+    their targets and weights. ``degrees`` of the kernel are chosen from once, with all inputs.
+    ``losses`` gives each sample's loss, shape (n_samples,), from the output without it.
     """
 
     def __init__(

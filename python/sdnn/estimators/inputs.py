@@ -406,6 +406,7 @@ class CodedClassifier(ClassifierMixin, CodedInputs):
         return table, labels
 
     def _set_classes(self, y: ArrayLike) -> None:
+        """Store the sorted labels; ValueError if there are fewer than two."""
         self.classes_: Array = unique_labels(y)
         if len(self.classes_) < 2:
             raise ValueError(f"at least two classes are needed, got one class: {self.classes_!r}")
@@ -416,6 +417,7 @@ class CodedClassifier(ClassifierMixin, CodedInputs):
 
     @staticmethod
     def _winners(decision: Floats) -> NDArray[np.int64]:
+        """Return the number of each sample's class, from scores as of `decision_function`."""
         winners = decision > 0 if decision.ndim == 1 else np.argmax(decision, axis=1)
         return np.asarray(winners, dtype=np.int64)
 

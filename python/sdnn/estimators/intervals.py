@@ -20,8 +20,7 @@ from sdnn.support.arguments import real
 N_ERRORS = 300  # errors of a stream that are remembered
 STEP = 0.02  # change of the level of a stream's intervals after an error
 
-ROUNDED_DOWN = 1.0 - 1e-12
-"""Factor against rounding, as 0.9 * 10 may be more than 9."""
+ROUNDED_DOWN = 1.0 - 1e-12  # factor against rounding, as 0.9 * 10 may be more than 9
 
 LEAST_SHARE = 0.01
 """Least size of an error for a model of sizes, as a share of the root mean square error."""
@@ -77,12 +76,7 @@ class FollowedErrors:
     They are a quantile of the last 300 errors, whose level rises after each target outside its
     interval, and falls a little after each other one, so that the coverage stays as the errors
     change. Source: Gibbs, I., Candes, E. (2021), Adaptive conformal inference under distribution
-    shift, NeurIPS 34.
-
-    Parameters
-    ----------
-    coverage : float
-        The share of targets that intervals are to contain.
+    shift, NeurIPS 34. ``coverage`` is the share of targets that intervals are to contain.
     """
 
     def __init__(self, coverage: float) -> None:

@@ -31,7 +31,7 @@ class Samples:
 
     targets: Floats  # shape (n_samples, n_outputs)
     weights: Floats
-    shares: Floats
+    shares: Floats  # 1 over the counts
 
     def __getitem__(self, rows: Rows) -> Samples:
         return Samples(self.targets[rows], self.weights[rows], self.shares[rows])

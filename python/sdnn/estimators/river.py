@@ -24,6 +24,7 @@ from sdnn.estimators.stream_estimator import (
     StreamEstimator,
     Target,
     cleaned_sample,
+    is_finite_number,
 )
 from sdnn.support.arguments import flag, require, shown
 
@@ -73,11 +74,7 @@ class RiverRegressor(StreamEstimator, base.Regressor):
         self.errors = FollowedErrors(self.coverage)
 
     def _check_target(self, y: Target) -> None:
-        try:
-            is_finite = math.isfinite(y)
-        except (OverflowError, TypeError, ValueError):
-            is_finite = False
-        require(is_finite, "y", "be a finite number", y)
+        require(is_finite_number(y), "y", "be a finite number", y)
 
     def _of_network(self, sample: Sample) -> Floats:
         return np.array([self.fitted.predict_one(sample)])
@@ -159,6 +156,7 @@ class RiverClassifier(StreamEstimator, base.Classifier):
         require(is_alike, "y", f"be a label, like {shown(first)}", y)
 
     def _learn(self, sample: Sample, y: Target) -> None:
+        """Learn a sample in the network; a new label becomes a class."""
         if y not in self.fitted.classes_:
             self.fitted._bins_of_one(sample)  # raises for a bad sample before a class is added
             self.fitted._add_class(y)
@@ -173,6 +171,7 @@ class RiverClassifier(StreamEstimator, base.Classifier):
         return np.asarray(is_predicted, dtype=np.float64)
 
     def _targets(self, targets: Sequence[Target]) -> Floats:
+        """Return labels as rows with 1 for the class and 0 for others, (n_samples, n_classes)."""
         shares = np.zeros((len(targets), len(self.fitted.classes_)))
         shares[np.arange(len(targets)), self.fitted._targets(np.array(targets))] = 1.0
         return shares

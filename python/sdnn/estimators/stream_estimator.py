@@ -46,15 +46,18 @@ def cleaned_sample(x: Features) -> Sample:
             continue
         if is_missing(value):
             sample[name] = None
-            continue
-        try:
-            is_finite = isinstance(value, str) or math.isfinite(value)
-        except (OverflowError, TypeError, ValueError):
-            is_finite = False
-        if not is_finite:
+        elif not (isinstance(value, str) or is_finite_number(value)):
             expected = "finite numbers, words, or None where they are missing"
             raise ValueError(f"x must have {expected}, got {shown(value)} for {name!r}")
     return sample
+
+
+def is_finite_number(value: Any) -> bool:
+    """Return whether a value of any type is a finite number."""
+    try:
+        return math.isfinite(value)
+    except (OverflowError, TypeError, ValueError):
+        return False
 
 
 def number_of(value: object) -> object:
@@ -196,7 +199,7 @@ class StreamEstimator:
         self.fitted.learn_one(sample, y)
 
     def _sample(self, sample: Mapping[str, object], learns: bool = False) -> dict[str, object]:
-        """Return the values of the known features, None for missing values."""
+        """Return the values of known features, None where missing; ranges may learn from them."""
         return self._moved(self._read(sample), learns)
 
     def _moved(self, read: Sample, learns: bool = False) -> Sample:
@@ -311,6 +314,7 @@ class StreamEstimator:
     def _learn_additions(self, sample: Mapping[str, object]) -> None:
         """Add new features and categories, a grace period after the first of them was observed."""
         if self.n_before_additions is None:
+            # Most samples have no other names: without categories none of them can be new.
             may_be_new = self.categories or not sample.keys() <= self.reads.keys()
             if not (may_be_new and any(self._is_new(*item) for item in sample.items())):
                 return

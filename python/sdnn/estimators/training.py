@@ -88,7 +88,7 @@ def sample_weights(
 
 
 def held_out_fifth(labels: Array, is_stratified: bool, seed: int) -> NDArray[np.bool_]:
-    """Return which samples are held out: a random fifth, or one of each class.
+    """Return which samples are held out: a random fifth, or that of each class (stratified).
 
     >>> held_out_fifth(np.arange(10), False, 0).sum()
     np.int64(2)

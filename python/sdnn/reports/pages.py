@@ -29,7 +29,7 @@ class Table:
     brief: Sequence[str] = ()  # columns that a terminal shows by default; empty: all
 
     def print(self, console: Console, *, full: bool = True) -> None:
-        """Print all columns, or the brief ones, which fit 80 characters."""
+        """Print all columns (`full`), or the brief ones, which fit 80 characters."""
         from rich import box
         from rich.table import Table as RichTable
         from rich.text import Text
@@ -108,7 +108,7 @@ class Page:
         return notes + [f"{name}: {text}." for name, text in terms]
 
     def print(self, console: Console, *, full: bool = False) -> None:
-        """Print the page without figures: tables that fit 80 characters, or everything."""
+        """Print the page without figures: tables that fit 80 characters, or everything (`full`)."""
         for line in (self.title, self.intro, *self.warnings):
             console.print(line, highlight=False, markup=False)
         tables = (section.table for section in self.sections if section.table)

@@ -23,8 +23,7 @@ COLORS = (
     "#1f5a96", "#c2542d", "#3c7d4b", "#7a5195", "#8a6d1d", "#4a4a4a",
     "#2a9d9d", "#c65b8e", "#7fa328", "#9b3d3d",
 )  # fmt: skip
-WIDTH = 9.2
-"""Inches of a figure that fills a page."""
+WIDTH = 9.2  # inches of a figure that fills a page
 NARROW_WIDTH, NARROW_DPI = 5.4, 144
 """Inches and resolution of figures for telephones: two pixels for each of 390."""
 _NARROW_FOOTER = 100  # characters of a line below a narrow figure

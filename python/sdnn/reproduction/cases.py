@@ -18,8 +18,7 @@ PAPER_INTERVAL = 10  # learning episodes between evaluations
 MOST_EPISODES = 10**8
 """Largest number of learning episodes per trial: rows of more tests would fill the memory."""
 
-SENSOR_NOISE = 0.02
-"""Standard deviation of the noise in the paper's Cases II to IV."""
+SENSOR_NOISE = 0.02  # standard deviation of the noise in the paper's Cases II to IV
 
 
 @dataclass(frozen=True)
@@ -102,8 +101,6 @@ PAPER_CASES: dict[str, Case] = {case.id: case for e in EXPERIMENTS for case in e
 def case_of_sensors(n_sensors: int, noise: float) -> Case:
     """Return the case with these sensors, the paper's if it has one; agents as in experiment B.
 
-    Examples
-    --------
     >>> case_of_sensors(6, 0.02).id, case_of_sensors(6, 0.03).id, case_of_sensors(5, 0).id
     ('s6-noise', 's6-noise-0.03', 's5')
     """
@@ -117,8 +114,7 @@ def case_of_sensors(n_sensors: int, noise: float) -> Case:
     return Case(case_id, title, n_sensors, noise, BOTH, "")
 
 
-COST = "cost"
-"""Name on the command line of the measurement of costs, which has no trials."""
+COST = "cost"  # name on the command line of the measurement of costs, which has no trials
 
 WORDS = (*(experiment.id for experiment in EXPERIMENTS), COST, "all")
 """Names on the command line of everything that can be reproduced."""

@@ -292,8 +292,8 @@ class TenTrials:
 
     def __init__(self, measured: Iterable[TrialMeasures]) -> None:
         self._measured = {(result.case_id, result.agent): result for result in measured}
-        self._draws = cache(self._draw)
-        self._met = cache(self._is_met)
+        self._draws = cache(self._draw)  # the draws of a subject, made once
+        self._met = cache(self._is_met)  # the draws that meet a check
 
     def chance(self, *claims: Claim) -> Estimate | None:
         """Return the share of the draws that show all the claims.
@@ -305,6 +305,7 @@ class TenTrials:
         for check in checks:
             if check.measure is None or set(check.subjects) - self._measured.keys():
                 return None
+        # Draws that meet all checks: from the trials, and from resamples of them.
         met = zip(*map(self._met, checks), strict=True)
         drawn, redrawn = (np.logical_and.reduce(arrays) for arrays in met)
         lower, upper = interval_limits(redrawn.mean(axis=1))

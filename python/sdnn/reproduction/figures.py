@@ -6,18 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sdnn.reports.plots import (
-    FAINT,
-    INK,
-    NARROW_WIDTH,
-    Axes,
-    Figure,
-    color_of,
-    label,
-    new_figure,
-    style,
-    wrapped,
-)
+from sdnn.reports import plots
 from sdnn.reproduction.cases import EXPERIMENTS, PAPER_EPISODES, PAPER_TRIALS, Experiment
 from sdnn.reproduction.cost import SERIES, CostRecord
 from sdnn.runs.figures import SMOOTHED_TESTS, agent_colors, draw_steps
@@ -36,7 +25,7 @@ def draw_experiment(
     *,
     quick: bool = False,
     narrow: bool = False,
-) -> Figure:
+) -> plots.Figure:
     """Draw an experiment: a panel per case, a line and an interquartile band per agent.
 
     With `quick` the figure is marked as preliminary. With `narrow` all panels are in one column,
@@ -47,13 +36,13 @@ def draw_experiment(
     is_long = max(result.last_episode for result in results) >= LONG_EPISODES
     has_legend = len({result.agent for result in results}) > 1 or experiment not in EXPERIMENTS
     height = 1.1 + n_rows * _PANEL_HEIGHT
-    figure = new_figure(5.4 * n_columns, height)
+    figure = plots.new_figure(5.4 * n_columns, height)
     panels = figure.subplots(n_rows, n_columns, sharey=True, squeeze=False).ravel()
     colors = agent_colors(result.agent for result in results)
     for number, (case, axes) in enumerate(zip(experiment.cases, panels, strict=False)):
         of_case = [result for result in results if result.case_id == case.id]
-        axes.set_title(case.title, fontsize=10.5, loc="left", color=INK)
-        axes.set_title(f"paper: {case.paper_figure}", fontsize=8, loc="right", color=FAINT)
+        axes.set_title(case.title, fontsize=10.5, loc="left", color=plots.INK)
+        axes.set_title(f"paper: {case.paper_figure}", fontsize=8, loc="right", color=plots.FAINT)
         draw_steps(axes, of_case, colors, smooth=is_long)
         axes.set_ylim(0, MAX_STEPS)
         if number % n_columns == 0:
@@ -80,16 +69,18 @@ def draw_experiment(
     return figure
 
 
-def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False, narrow: bool = False) -> Figure:
+def draw_cost(
+    costs: Sequence[CostRecord], *, quick: bool = False, narrow: bool = False
+) -> plots.Figure:
     """Draw the time of a step against the number of inputs, a line per series, on a log scale.
 
     Exponential growth is a straight line there; quadratic growth bends. A dotted line continues
-    what SDNN-C needs with 4 inputs by its number of columns. With `narrow` the legend is above the
-    panel, for telephones.
+    what SDNN-C needs with 4 inputs by its number of columns. With `quick` it is marked as
+    preliminary. With `narrow` the legend is above the panel, for telephones.
     """
-    figure = new_figure(NARROW_WIDTH, 6.2) if narrow else new_figure(9.4, 4.7)
+    figure = plots.new_figure(plots.NARROW_WIDTH, 6.2) if narrow else plots.new_figure(9.4, 4.7)
     axes = figure.add_subplot()
-    colors = [color_of(number) for number in range(len(SERIES))]
+    colors = [plots.color_of(number) for number in range(len(SERIES))]
     for number, series in enumerate(SERIES):
         series_costs = sorted((c for c in costs if c.series == series.id), key=lambda c: c.n_inputs)
         if not series_costs:
@@ -114,12 +105,12 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False, narrow: bool 
     axes.set_xticks(sorted({cost.n_inputs for cost in costs}))
     axes.set_xlabel("number of inputs d")
     axes.set_ylabel("time of a step [µs]")
-    style(axes)
+    plots.style(axes)
     figure.legend(
         frameon=False, fontsize=9, labelspacing=1.0, ncols=2 if narrow else 1,
         loc="outside upper center" if narrow else "outside right upper",
     )  # fmt: skip
-    axes.set_title("Cost of a step against the number of inputs", loc="left", color=INK)
+    axes.set_title("Cost of a step against the number of inputs", loc="left", color=plots.INK)
     if quick:
         _watermark(axes)
     machines = ", ".join(sorted({cost.machine for cost in costs}))
@@ -128,12 +119,12 @@ def draw_cost(costs: Sequence[CostRecord], *, quick: bool = False, narrow: bool 
         f" transition to it.\nsdnn {costs[0].version}; {machines}; one thread."
     )
     if narrow:
-        footer = wrapped(footer)
-    figure.supxlabel(footer, x=0.012, ha="left", fontsize=6.5, color=FAINT, linespacing=1.4)
+        footer = plots.wrapped(footer)
+    figure.supxlabel(footer, x=0.012, ha="left", fontsize=6.5, color=plots.FAINT, linespacing=1.4)
     return figure
 
 
-def _watermark(axes: Axes) -> None:
+def _watermark(axes: plots.Axes) -> None:
     """Mark a figure of a quick reproduction, so that it is not taken for the result."""
     axes.text(
         0.5, 0.6, "quick", transform=axes.transAxes, ha="center", va="center",
@@ -142,7 +133,7 @@ def _watermark(axes: Axes) -> None:
 
 
 def _label(
-    figure: Figure,
+    figure: plots.Figure,
     title: str,
     results: Sequence[CaseResult],
     *,
@@ -150,7 +141,10 @@ def _label(
     quick: bool,
     narrow: bool,
 ) -> None:
-    """Write title, warning and footer: the scale of the study and its configurations."""
+    """Write title, warning and footer: the scale of the study and its configurations.
+
+    Flags are those of the figure: whether there are running medians, few trials, a single column.
+    """
     fewest, most = min(r.n_trials for r in results), max(r.n_trials for r in results)
     trials = f"{fewest}" if fewest == most else f"{fewest} to {most}"
     n_episodes = max(result.last_episode for result in results)
@@ -168,4 +162,4 @@ def _label(
     versions = ", ".join(sorted({record.version for r in results for record in r.records}))
     footer = f"{legend} {scale} per case and agent.\nsdnn {versions}; configuration "
     footer += ",\n".join(lines)
-    label(figure, title, below, wrapped(footer) if narrow else footer, _WARNING_COLOR)
+    plots.label(figure, title, below, plots.wrapped(footer) if narrow else footer, _WARNING_COLOR)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from sdnn._core import __version__
 from sdnn.environments.paper_acrobot import PAPER_ACROBOT
-from sdnn.reproduction.cases import MOST_EPISODES, PAPER_CASES, PAPER_INTERVAL
+from sdnn.reproduction.cases import MOST_EPISODES, PAPER_CASES, PAPER_EPISODES, PAPER_INTERVAL
 from sdnn.reproduction.claims import FILE_NAME, HEADER
 from sdnn.reproduction.reproduce import case_spec
 from sdnn.runs.errors import RunError
@@ -22,8 +22,7 @@ from sdnn.runs.trial import TrialKey, trial_seed
 from sdnn.support.arguments import shown
 from sdnn.support.files import read_bytes
 
-MOST_BYTES = 2**26
-"""Largest file of reference results."""
+MOST_BYTES = 2**26  # largest file of reference results
 
 
 class ReferenceReports:
@@ -96,9 +95,9 @@ class ReferenceReports:
         return (True for _ in keys)
 
 
-def _paper_spec(case_id: str, agent: str, n_episodes: int | None = None) -> RunSpec:
-    case = replace(PAPER_CASES[case_id], agents=(agent,))
-    return case_spec(case, agent) if n_episodes is None else case_spec(case, agent, n_episodes)
+def _paper_spec(case_id: str, agent: str, n_episodes: int = PAPER_EPISODES) -> RunSpec:
+    """Return the specification of any agent in a case of the paper."""
+    return case_spec(replace(PAPER_CASES[case_id], agents=(agent,)), agent, n_episodes)
 
 
 def differences_from_paper(trial: ReportedTrial) -> dict[str, tuple[str, str]]:

@@ -296,6 +296,7 @@ def _more_table(claims: Iterable[ClaimOutcome]) -> Table:
 
 
 def _case_json(experiment: Experiment, result: CaseResult) -> dict[str, object]:
+    """Return a result as values for JSON, with its case and the paper's figure of it."""
     figure = next(c.paper_figure for c in experiment.cases if c.id == result.case_id)
     names = {"case": result.case_id, "title": result.title, "paper_figure": figure}
     return names | result.to_json()
@@ -340,4 +341,5 @@ def _cost_cell(cost: CostRecord | None, with_one_less: CostRecord | None) -> str
 
 
 def _growth(ratio: float) -> str:
+    """Write how many times as long something takes, such as "1.5x" or "1,200x"."""
     return f"{ratio:.1f}x" if ratio < 100 else f"{ratio:,.0f}x"

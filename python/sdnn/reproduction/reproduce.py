@@ -285,8 +285,7 @@ def plan_trials(
     return Study("", specs_of(cases, n_episodes), n_trials=n_trials, seed=root_seed).plan()
 
 
-MIN_TRIALS_TO_DRAW = 2 * PAPER_TRIALS
-"""Smallest number of trials from which draws of ten are made."""
+MIN_TRIALS_TO_DRAW = 2 * PAPER_TRIALS  # smallest number of trials from which draws of ten are made
 
 CLAIMS_NOTE = "A claim is shown where the study has every case and agent that it speaks of."
 CHANCES_NOTE = (

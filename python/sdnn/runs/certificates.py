@@ -20,8 +20,7 @@ from sdnn.runs.trial import TrialKey, TrialRecord, canonical_json, config_hash
 from sdnn.support.files import read_bytes, write_whole
 from sdnn.support.machine import instruction_set
 
-MOST_BYTES = 2**26
-"""Largest file."""
+MOST_BYTES = 2**26  # size of the largest file
 
 Word = Annotated[str, Meta(max_length=1000)]
 

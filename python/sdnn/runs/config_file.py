@@ -22,11 +22,9 @@ from sdnn.runs.spec import RunSpec
 from sdnn.support.files import read_bytes
 from sdnn.support.toml import TOO_DEEP, KeyPath, deep_key, dotted, line_of, parse_toml
 
-FORMAT = "sdnn-run-2"
-"""Format of the configuration in a run's folder."""
+FORMAT = "sdnn-run-2"  # format of the configuration in a run's folder
 
-MOST_BYTES = 2**20
-"""Largest file of settings."""
+MOST_BYTES = 2**20  # largest file of settings
 
 
 @dataclass(frozen=True)
@@ -54,8 +52,8 @@ class ConfigFile:
         except (ValueError, msgspec.DecodeError) as error:
             line = re.search(r"(?:at )?line (\d+)", str(error))
             place = f"{path}:{line[1]}" if line else str(path)
-            kind = "TOML" if is_toml else "JSON"
-            raise ConfigError("", f"must be {kind}: {error}", place) from error
+            name = "TOML" if is_toml else "JSON"
+            raise ConfigError("", f"must be {name}: {error}", place) from error
         if not isinstance(values, dict):
             raise ConfigError("", f"must hold a table, got {values!r:.80}", str(path))
         if deep := deep_key(values):
@@ -76,10 +74,11 @@ class ConfigFile:
         """Add file and line to an error, unless a command-line option has set its key."""
         key = tuple(error.key.partition("[")[0].split("."))
         # A table that the file lacks can only come from options.
-        for name in (error.key, key[0] if key[0] not in self.values else error.key):
-            # An option for the key, for a table that holds it, or for a key within it.
-            if any(f"{name}.".startswith(f"{o}.") or o.startswith(f"{name}.") for o in options):
-                return error
+        for name in {error.key, error.key if key[0] in self.values else key[0]}:
+            for option in options:
+                # It sets the key, a table that holds it, or a key within it.
+                if f"{name}.".startswith(f"{option}.") or option.startswith(f"{name}."):
+                    return error
         return error if error.place else ConfigError(error.key, error.problem, self.place(key))
 
     def place(self, key: KeyPath) -> str:
@@ -112,39 +111,31 @@ PAPER_ARGUMENTS: dict[str, type[object]] = get_type_hints(PaperSettings)
 
 def core_parts() -> dict[str, tuple[type[object], ...]]:
     """Return the classes of settings in the core, by the table of a specification."""
+    compiled = [entry for entry in AGENTS.values() if entry.core_trial]
     return {
-        part: tuple({getattr(entry, part): None for entry in AGENTS.values() if entry.core_trial})
-        for part in ("approximator", "learning")
+        "approximator": tuple(dict.fromkeys(entry.approximator for entry in compiled)),
+        "learning": tuple(dict.fromkeys(entry.learning for entry in compiled)),
     }
 
 
 def spec_schema() -> Values:
     """Return the JSON Schema of a specification.
 
-    Examples
-    --------
     >>> spec_schema()["$defs"]["QLearningConfig"]["properties"]["epsilon"]["maximum"]
     1.0
     """
     parts = core_parts()
-    configs = [config for configs in parts.values() for config in configs]
-    structs = [  # the core's classes as msgspec's, for its JSON Schema
-        msgspec.defstruct(
-            config.__name__,
-            [
-                (f.name, _schema_of_type(f), f.default)
-                for f in fields_of(config)
-                if f.name != "n_inputs"
-            ],
-            forbid_unknown_fields=True,
-        )
-        for config in (*configs, *PAPER_ARGUMENTS.values())
-    ]
+    configs = (*parts["approximator"], *parts["learning"], *PAPER_ARGUMENTS.values())
+    structs = []  # the core's classes as msgspec's, for its JSON Schema
+    for config in configs:
+        fields = [(f.name, _schema_of_type(f), f.default) for f in fields_of(config)]
+        fields = [field for field in fields if field[0] != "n_inputs"]
+        structs.append(msgspec.defstruct(config.__name__, fields, forbid_unknown_fields=True))
     components = schemas_of(RunSpec, *structs)
     properties = components["RunSpec"]["properties"]
     for table, core in parts.items():
         properties[table]["anyOf"] = [
-            *({"$ref": f"#/$defs/{kind.__name__}"} for kind in core),
+            *({"$ref": f"#/$defs/{config.__name__}"} for config in core),
             {"type": "object"},  # settings of an agent that a user has registered
         ]
     # Arguments of the paper's acrobot, in the schema of its environment alone.

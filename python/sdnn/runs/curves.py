@@ -29,14 +29,11 @@ from sdnn.training.loop import Row
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
 
-WINDOW = 20
-"""Episodes in the running median of the returns, or all if there are fewer."""
+WINDOW = 20  # episodes in the running median of the returns, or all if there are fewer
 
-MAX_POINTS = 500
-"""The most points of a running median over several runs."""
+MAX_POINTS = 500  # the most points of a running median over several runs
 
-SUFFIXES = (".png", ".svg", ".pdf")
-"""Kinds of figures that the curves of runs may be written as."""
+SUFFIXES = (".png", ".svg", ".pdf")  # kinds of figures that the curves of runs may be written as
 
 HEADER = ("task", "agent", "kind", "n_runs", "run", "step", "value", "low", "high")
 
@@ -106,11 +103,11 @@ def _goal_labels(run: Run) -> Iterator[str]:
     """Describe a run's goals; later goals with the step at which the user has set them."""
     budget = run.spec.budget
     yield f"{budget.episodes} episodes" if budget.steps is None else f"{budget.steps} steps"
-    due = None if budget.target_return is not None else budget.steps
+    end = None if budget.target_return is not None else budget.steps  # of the goal before, if known
     for goal in run.goals:
-        start = "" if due is None or goal.at_step >= due else f"from {goal.at_step} on "
+        start = "" if end is None or goal.at_step >= end else f"from {goal.at_step} on "
         yield start + (f"{goal.episodes} episodes" if goal.steps is None else f"{goal.steps} steps")
-        due = goal.steps
+        end = goal.steps
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -215,10 +215,10 @@ class _Run:
         completed = as_completed(loop=self.client.loop, with_results=True, raise_errors=False)
         progress: SimpleQueue[tuple[Key, int]] = SimpleQueue()
         self.client.subscribe_topic(PROGRESS_TOPIC, lambda event: progress.put(event[1]))
-        looked = -math.inf
+        updated_at = -math.inf
         while self.waiting or self.placed:
-            if time.monotonic() - looked > WORKERS_SECONDS:
-                looked = time.monotonic()
+            if time.monotonic() - updated_at > WORKERS_SECONDS:
+                updated_at = time.monotonic()
                 yield list(self.update_workers())
             begun = []
             while self.waiting and len(self.placed) < sum(self.threads.values()):
@@ -235,12 +235,9 @@ class _Run:
             yield begun
             if stop.wait(RESULTS_SECONDS):
                 return
-            reported = [progress.get() for _ in range(progress.qsize())]
-            yield [
-                Advanced(self.placed[key].planned, episode)
-                for key, episode in reported
-                if key in self.placed
-            ]
+            reports = (progress.get() for _ in range(progress.qsize()))
+            placed = self.placed
+            yield [Advanced(placed[key].planned, n) for key, n in reports if key in placed]
             batch: list[Message] = []
             try:
                 for future, result in completed.next_batch(block=False):

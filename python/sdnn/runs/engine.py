@@ -349,11 +349,9 @@ class Team:
                 del self.trials[planned]
 
 
-MOST_TOGETHER = 8
-"""Largest number of trials in a team: the widest vector register holds 8 doubles."""
+MOST_TOGETHER = 8  # largest number of trials in a team: the widest vector register holds 8 doubles
 
-MOST_TABLE_BYTES = 2**26
-"""Largest table of an agent that runs in a team, in bytes."""
+MOST_TABLE_BYTES = 2**26  # largest table of an agent that runs in a team, in bytes
 
 
 def teams_of(planned: Iterable[PlannedTrial], jobs: int) -> Iterable[list[PlannedTrial]]:

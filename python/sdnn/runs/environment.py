@@ -35,8 +35,7 @@ from sdnn.runs.errors import ConfigError, RunError
 from sdnn.runs.settings import Settings, doc, with_changes
 from sdnn.support.arguments import blamed, shown
 
-ALL = "all"
-"""The key of the range for all variables without a range."""
+ALL = "all"  # the key of the range for all variables without a range
 
 
 class PaperSettings(NamedTuple):

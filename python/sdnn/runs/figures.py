@@ -8,18 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.agents.registry import labels, title_of
-from sdnn.reports.plots import (
-    FAINT,
-    INK,
-    NARROW_WIDTH,
-    Axes,
-    Figure,
-    color_of,
-    label,
-    new_figure,
-    style,
-    wrapped,
-)
+from sdnn.reports import plots
 from sdnn.reports.statistics import estimate_mean, running_median
 from sdnn.runs.results import CaseResult, MeasureName
 from sdnn.runs.study import Comparison, Measured
@@ -42,11 +31,11 @@ _OF_STEPS, _OF_RETURNS = tuple(_TITLES)[:2], tuple(_TITLES)[2:]
 
 def agent_colors(agents: Iterable[str]) -> dict[str, str]:
     """Return a color for each agent by its position in the registry, the same in all figures."""
-    return {agent: color_of(labels().index(agent)) for agent in agents}
+    return {agent: plots.color_of(labels().index(agent)) for agent in agents}
 
 
 def draw_steps(
-    axes: Axes, results: Sequence[CaseResult], colors: dict[str, str], *, smooth: bool
+    axes: plots.Axes, results: Sequence[CaseResult], colors: dict[str, str], *, smooth: bool
 ) -> None:
     """Draw steps of test episodes: a median and an interquartile band per agent, the first on top.
 
@@ -68,10 +57,10 @@ def draw_steps(
     axes.set_xlim(0, max(result.last_episode for result in results))
     axes.xaxis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 5, 10]))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
-    style(axes)
+    plots.style(axes)
 
 
-def draw_study(comparison: Comparison, footer: str, *, narrow: bool = False) -> Figure:
+def draw_study(comparison: Comparison, footer: str, *, narrow: bool = False) -> plots.Figure:
     """Draw a study: for each case two panels, one below the other, with a line for each variant.
 
     Faint dots are trials, since outcomes often lie in two heaps; a large dot is their median, of
@@ -84,9 +73,9 @@ def draw_study(comparison: Comparison, footer: str, *, narrow: bool = False) -> 
     n_rows = 2 * -(-len(cases) // n_columns)
     # Inches that the titles of variants take at the left.
     title_width = 0.3 + 0.072 * max(len(variant.title) for variant in comparison.variants)
-    width = NARROW_WIDTH if narrow else max(6.4, title_width + n_columns * _PANEL_WIDTH)
+    width = plots.NARROW_WIDTH if narrow else max(6.4, title_width + n_columns * _PANEL_WIDTH)
     panel_height = 1.0 + _LINE_HEIGHT * len(comparison.variants)
-    figure = new_figure(width, 1.2 + n_rows * panel_height)
+    figure = plots.new_figure(width, 1.2 + n_rows * panel_height)
     grid = figure.subplots(n_rows, n_columns, squeeze=False)
     for axes in grid.ravel():
         axes.set_visible(False)
@@ -94,7 +83,7 @@ def draw_study(comparison: Comparison, footer: str, *, narrow: bool = False) -> 
         row, column = divmod(number, n_columns)
         pair = grid[2 * row : 2 * row + 2, column]
         _draw_case(pair, comparison, case.id, with_names=column == 0)
-        pair[0].set_title(case.title, fontsize=9, loc="left", color=INK)
+        pair[0].set_title(case.title, fontsize=9, loc="left", color=plots.INK)
     study = comparison.study
     below = (
         f"{study.n_trials} trials per case and variant; compared with {study.reference} (dotted)"
@@ -105,14 +94,19 @@ def draw_study(comparison: Comparison, footer: str, *, narrow: bool = False) -> 
         " of the mean paired difference leaves 0 out)."
         f" Numbers at the right: trials that end solved.\n{footer}"
     )
-    label(figure, study.title, below, wrapped(text.replace("what\n", "what ")) if narrow else text)
+    plots.label(
+        figure,
+        study.title,
+        below,
+        plots.wrapped(text.replace("what\n", "what ")) if narrow else text,
+    )
     return figure
 
 
 def _draw_case(
     pair: NDArray[np.object_], comparison: Comparison, case_id: str, *, with_names: bool
 ) -> None:
-    """Draw the two panels of a case: a row for each variant, the reference in bold."""
+    """Draw the two panels of a case: a row for each variant, whose names may be at the left."""
     measured = comparison.of_case(case_id)
     lines = {variant.id: line for line, variant in enumerate(comparison.variants)}
     reference = comparison.study.reference
@@ -135,7 +129,8 @@ def _draw_case(
 
 
 def _draw_variant(
-    axes: Axes, measured: Measured, name: MeasureName, line: int, color: str, is_reference: bool
+    axes: plots.Axes, measured: Measured, name: MeasureName, line: int, color: str,
+    is_reference: bool,
 ) -> None:  # fmt: skip
     """Draw a measure of a variant on its line: a dot per trial, their median, and its interval."""
     result = measured.result
@@ -162,16 +157,16 @@ def _draw_variant(
         axes.axvline(value, color=color, linewidth=0.9, linestyle=":", zorder=1)
     if name == "final_share_solved":
         axes.text(
-            1.01, line, measured.end_solved.replace(" of ", "/"), fontsize=6.5, color=FAINT,
+            1.01, line, measured.end_solved.replace(" of ", "/"), fontsize=6.5, color=plots.FAINT,
             va="center", transform=axes.get_yaxis_transform(),
         )  # fmt: skip
 
 
-def _label_case(axes: Axes, name: MeasureName, last: int) -> None:
+def _label_case(axes: plots.Axes, name: MeasureName, last: int) -> None:
     """Set limits, ticks and labels of a panel by its measure; `last` is the last episode."""
     from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-    axes.set_xlabel(_TITLES[name], fontsize=8, color=INK)
+    axes.set_xlabel(_TITLES[name], fontsize=8, color=plots.INK)
     axes.xaxis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 2.5, 5, 10]))
     if name == "final_share_solved":
         axes.set_xlim(-3, 103)  # percent, with a margin for dots at the limits
@@ -181,7 +176,7 @@ def _label_case(axes: Axes, name: MeasureName, last: int) -> None:
         axes.xaxis.set_major_formatter(
             FuncFormatter(lambda value, _: f">{value:,.0f}" if value >= last else f"{value:,.0f}")
         )
-    style(axes, grid="x")
+    plots.style(axes, grid="x")
     axes.tick_params(labelsize=8)
     axes.tick_params(axis="y", length=0)
     axes.spines["left"].set_visible(False)

@@ -31,20 +31,8 @@ from sdnn.agents.q_learning import ValueAgent
 from sdnn.agents.schedules import schedule_of
 from sdnn.agents.state_maps import Replay, StateMap, map_of, replay
 from sdnn.environments.types import Data
+from sdnn.reports import plots
 from sdnn.reports.pages import Page, Section, Table
-from sdnn.reports.plots import (
-    FAINT,
-    INK,
-    NARROW_DPI,
-    NARROW_WIDTH,
-    WIDTH,
-    Figure,
-    color_of,
-    new_figure,
-    png_bytes,
-    style,
-    svg_bytes,
-)
 from sdnn.runs.errors import ConfigError, RunError
 from sdnn.runs.report import require_matplotlib
 from sdnn.runs.run import Run, agent_of
@@ -53,8 +41,7 @@ from sdnn.support.files import write_whole
 from sdnn.training.loop import Row
 
 FILE_NAME = "inspect.html"
-FEW_UNITS = 1_000
-"""Number of value units in a reward below which rewards are rounded noticeably."""
+FEW_UNITS = 1_000  # number of value units in a reward below which rewards are rounded noticeably
 LITTLE_USED, OFTEN_OUTSIDE = 0.1, 0.1
 """Share of a range below which it is hardly used, and share of states outside that is large."""
 N_POINTS = 60  # points of a curve of scheduled settings
@@ -298,36 +285,38 @@ class Inspection:
             if use is not None and use.outside > OFTEN_OUTSIDE:
                 yield f"{agent_input.name} is outside its range in {use.outside:.0%} of the states."
 
-    def draw_learning(self, *, narrow: bool = False) -> Figure:
-        """Draw the returns of episodes and evaluations, and below them epsilon and alpha."""
+    def draw_learning(self, *, narrow: bool = False) -> plots.Figure:
+        """Draw returns, and below them epsilon and alpha; `narrow` is a figure for telephones."""
         episodes = [row for row in self.rows if row["kind"] == "episode"]
         evaluations = [row for row in self.rows if row["kind"] == "evaluation"]
         has_schedule = isinstance(self.agent, ValueAgent) and bool(self.rows)
-        width = NARROW_WIDTH if narrow else WIDTH
-        figure = new_figure(width, 3.8 if has_schedule else 2.6)
+        width = plots.NARROW_WIDTH if narrow else plots.WIDTH
+        figure = plots.new_figure(width, 3.8 if has_schedule else 2.6)
         panels = figure.subplots(1 + has_schedule, 1, sharex=True, squeeze=False)[:, 0]
         panels[0].plot(
             [row["step"] for row in episodes], [row["return"] for row in episodes], ".",
-            color=FAINT, alpha=0.5, markersize=3, rasterized=True, label="episode",
+            color=plots.FAINT, alpha=0.5, markersize=3, rasterized=True, label="episode",
         )  # fmt: skip
         if evaluations:
             x, y = ([row[name] for row in evaluations] for name in ("step", "mean_return"))
-            panels[0].plot(x, y, "o-", color=color_of(0), markersize=3.5, label="evaluation, mean")
-        panels[0].set_ylabel("return", fontsize=9, color=INK)
+            panels[0].plot(
+                x, y, "o-", color=plots.color_of(0), markersize=3.5, label="evaluation, mean"
+            )
+        panels[0].set_ylabel("return", fontsize=9, color=plots.INK)
         panels[0].legend(fontsize=8, frameon=False)
-        style(panels[0])
+        plots.style(panels[0])
         if has_schedule and isinstance(self.agent, ValueAgent):
             steps = np.linspace(0, max(row["step"] for row in self.rows), N_POINTS).round()
             schedule = schedule_of(self.agent, steps, self._progress_at(steps, episodes))
             for values, name, color in (
-                (schedule.epsilon, "epsilon", color_of(1)),
-                (schedule.learning_rate, "alpha", color_of(2)),
+                (schedule.epsilon, "epsilon", plots.color_of(1)),
+                (schedule.learning_rate, "alpha", plots.color_of(2)),
             ):
                 panels[1].plot(steps, values, color=color, linewidth=1.4, label=name)
             panels[1].set_ylim(bottom=0)
             panels[1].legend(fontsize=8, frameon=False)
-            style(panels[1])
-        panels[-1].set_xlabel("step", fontsize=9, color=INK)
+            plots.style(panels[1])
+        panels[-1].set_xlabel("step", fontsize=9, color=plots.INK)
         return plain(figure)
 
     def _progress_at(self, steps: Floats, episodes: Sequence[Row]) -> Floats:
@@ -363,10 +352,10 @@ class Inspection:
         }
 
 
-def _drawn_section(draw: Callable[..., Figure], **fields: Any) -> Section:
+def _drawn_section(draw: Callable[..., plots.Figure], **fields: Any) -> Section:
     """Make a section with the figure that `draw` returns, and its narrow form for telephones."""
-    narrow = png_bytes(draw(narrow=True), NARROW_DPI)
-    return Section(picture=svg_bytes(draw()), narrow_picture=narrow, **fields)
+    narrow = plots.png_bytes(draw(narrow=True), plots.NARROW_DPI)
+    return Section(picture=plots.svg_bytes(draw()), narrow_picture=narrow, **fields)
 
 
 def inspect_run(

@@ -9,8 +9,7 @@ from pathlib import Path
 
 from sdnn.support.files import is_there
 
-BUSY_SECONDS = 60.0
-"""Seconds to wait for another process that writes the same file."""
+BUSY_SECONDS = 60.0  # seconds to wait for another process that writes the same file
 
 _MAGIC_OF_JOURNAL = bytes.fromhex("d9d505f920a163d7")
 """First bytes of a journal; also its last bytes if it names a super-journal."""

@@ -25,11 +25,9 @@ SUFFIXES = (".gif", ".mp4")
 _PALETTES = "split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1:dither=none"
 """ffmpeg's filter for a palette per frame: a common one would keep all frames in memory."""
 
-FRAMES_PER_SECOND = 30
-"""Frame rate for environments without one in their metadata."""
+FRAMES_PER_SECOND = 30  # frame rate for environments without one in their metadata
 
-_FASTEST_GIF = 50
-"""Largest frame rate: viewers slow faster GIFs down."""
+_FASTEST_GIF = 50  # largest frame rate: viewers slow faster GIFs down
 
 
 @dataclass

@@ -30,8 +30,7 @@ from sdnn.support.toml import leaves
 MOST_TABLE_BYTES = 2**33
 """Largest limit of an agent's tables that a reported configuration may set, in bytes."""
 
-MOST_DECISIONS = 10**9
-"""Largest number of decisions of a trial that is run again."""
+MOST_DECISIONS = 10**9  # largest number of decisions of a trial that is run again
 
 _TRUSTED = frozenset({"gymnasium", "sdnn"})
 """Packages whose registered environments need no consent."""
@@ -113,8 +112,8 @@ class ReportedTrial:
 
     def digest_of(self, rows: TrialRows) -> str:
         """Return the digest of other rows, as long as the reported one."""
-        whole = rows.digest() if self.covers_tests else rows.checksum()
-        return whole[: len(self.digest)]
+        digest = rows.digest() if self.covers_tests else rows.checksum()
+        return digest[: len(self.digest)]
 
     def spec(self, consent: Consent) -> RunSpec:
         """Return the specification in the configuration; it is the same on every machine.
@@ -174,11 +173,12 @@ class ReportedTrial:
             problem = f"must fit the {n_decisions} reported decisions, got {length}"
             raise ConfigError("goals", problem)
         if spec.budget.target_return is not None or goal is not None:
-            return
+            return  # the run may have ended before its budget
         by_steps, by_episodes = protocol.evaluate_every, protocol.evaluate_every_episodes
         interval = by_steps if unit == "steps" else by_episodes
         n_evaluations = spec.length // interval if interval else 0
         n_evaluated = n_evaluations * protocol.evaluation_episodes
+        # Every step, and every episode of learning or evaluation, has a decision at least.
         for key, needed in (
             (f"budget.{unit}", spec.length),
             ("protocol.evaluation_episodes", spec.length + n_evaluated),

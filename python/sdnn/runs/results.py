@@ -31,16 +31,12 @@ MeasureName = Literal[
     "mean_return",
 ]
 
-SHARE_STABLE = 0.9
-"""Share of test episodes that an agent must solve at the end to be called stable."""
-GOOD_STEPS = 10.0
-"""Most steps of a good test episode: the paper's "within 10 steps"."""
+SHARE_STABLE = 0.9  # share of test episodes that an agent must solve at the end to be called stable
+GOOD_STEPS = 10.0  # most steps of a good test episode: the paper's "within 10 steps"
 LEARNED_WINDOW, STABLE_WINDOW = 10, 50
 """Tests in a row whose median must be good for the task to count as learned, and as mastered."""
-EARLY_EPISODES = 2_500
-"""A third of the way to the paper's 7,500."""
-FINAL_WINDOW = 50
-"""Tests at the end."""
+EARLY_EPISODES = 2_500  # a third of the way to the paper's 7,500
+FINAL_WINDOW = 50  # tests at the end of a trial that are measured
 
 
 def episodes_to_learn(episode: ArrayLike, steps: ArrayLike) -> float:
@@ -146,8 +142,7 @@ MEASURES: dict[MeasureName, tuple[str, Callable[[TrialRows], float]]] = {
 }
 """Meaning of each measure, and the function that takes it from the rows of a trial."""
 
-RETURN_MEASURES: tuple[MeasureName, ...] = ("final_return", "mean_return")
-"""Measures of any task."""
+RETURN_MEASURES: tuple[MeasureName, ...] = ("final_return", "mean_return")  # measures of any task
 
 STEP_MEASURES: tuple[MeasureName, ...] = tuple(n for n in MEASURES if n not in RETURN_MEASURES)
 """Measures of tasks to be solved in few steps, such as the acrobot's."""

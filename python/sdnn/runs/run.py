@@ -318,7 +318,7 @@ class Run(Displayed):
     def _trial(
         self, callbacks: list[Callback], *, has_goal: bool, repeat_episodes: bool
     ) -> TrainingTrial:
-        """Make the training up to the goal, resumed at the checkpoint if there is one."""
+        """Make the training, resumed at a checkpoint; a new goal drops the target (`has_goal`)."""
         spec = self.spec
         if self.goals or has_goal:
             spec = spec.replace(budget=spec.budget.replace(target_return=None))
@@ -399,12 +399,13 @@ class _StoredCheckpoints(CheckpointCallback):
         self._rows, self._stored_at = [], time.monotonic()
 
     def _seconds(self) -> float:
+        """Return the processor time of this thread since the last call."""
         before, self._clock = self._clock, time.thread_time()
         return self._clock - before
 
 
 def agent_of(folder: Path, *, best: bool = False) -> AnyAgent:
-    """Load the agent of a run like `Run.agent`, even if the configuration is damaged."""
+    """Load the last or best agent of a run, even if the configuration is damaged."""
     if not (folder / CONFIG).exists():
         raise RunError(f"{folder} holds no run: there is no {folder / CONFIG}")
     names = (BEST,) if best else (CHECKPOINT, AGENT)

@@ -76,9 +76,9 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """
 
     def __post_init__(self) -> None:
-        for name, kind in _types_of_fields(type(self)).items():
+        for name, field_type in _types_of_fields(type(self)).items():
             value = getattr(self, name)
-            converted = convert_value(kind, value, name)
+            converted = convert_value(field_type, value, name)
             if converted is not value:
                 msgspec.structs.force_setattr(self, name, converted)
 
@@ -88,67 +88,67 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 @functools.cache
-def _types_of_fields(kind: type[object]) -> Mapping[str, Any]:
+def _types_of_fields(settings_class: type[object]) -> Mapping[str, Any]:
     """Return the annotation of each field of a table of settings."""
     try:
-        hints = typing.get_type_hints(kind, include_extras=True)
+        hints = typing.get_type_hints(settings_class, include_extras=True)
     except (NameError, TypeError):  # annotations of a user's agent: accept any value
         hints = {}
-    return {name: hints.get(name, Any) for name in names_of(kind)}
+    return {name: hints.get(name, Any) for name in names_of(settings_class)}
 
 
-def schemas_of(*kinds: object) -> Values:
+def schemas_of(*classes: object) -> Values:
     """Return the JSON Schemas of classes and their nested classes, by name."""
     _, schemas = msgspec.json.schema_components(
-        kinds, ref_template="#/$defs/{name}", schema_hook=lambda _: {"type": "object"}
+        classes, ref_template="#/$defs/{name}", schema_hook=lambda _: {"type": "object"}
     )
     return schemas
 
 
-def names_of(kind: type[Any]) -> tuple[str, ...]:
+def names_of(settings_class: type[Any]) -> tuple[str, ...]:
     """Return the names of the fields of a class of settings, or of another dataclass."""
-    if issubclass(kind, msgspec.Struct):
-        return kind.__struct_fields__
-    return tuple(field.name for field in dataclasses.fields(kind) if field.init)
+    if issubclass(settings_class, msgspec.Struct):
+        return settings_class.__struct_fields__
+    return tuple(field.name for field in dataclasses.fields(settings_class) if field.init)
 
 
-def convert_value(kind: object, value: object, key: str) -> Any:
+def convert_value(value_type: object, value: object, key: str) -> Any:
     """Convert a value to a type: arrays to tuples, 1 to 1.0, tables to settings.
 
     ConfigError if that is impossible.
     """
-    if _alternatives(kind) == (PartSettings,):
+    if _alternatives(value_type) == (PartSettings,):
         return value  # the agent decides about the type: see `with_changes`
     if isinstance(value, np.generic | np.ndarray):
         if isinstance(value, np.ma.MaskedArray) or value.dtype.kind not in "biufU":
             raise ConfigError(key, f"must be numbers or texts, got {shown(value)}")
         value = value.tolist()
     if isinstance(value, Mapping):
-        for form in _alternatives(kind):
+        for form in _alternatives(value_type):
             if isinstance(form, type) and issubclass(form, Settings):
                 return read_table(form, value, key)
             if get_origin(form) is dict:
                 for name, item in value.items():
                     convert_value(get_args(form)[1], item, f"{key}.{name}")
     try:
-        converted = msgspec.convert(value, kind)
+        converted = msgspec.convert(value, value_type)
     except (msgspec.ValidationError, UnicodeEncodeError) as error:  # a command line has any bytes
         text, _, path = str(error).partition(" - at `$")
-        problem = _expected_value(_alternatives(kind) if not path else (), text)
+        problem = _expected_value(_alternatives(value_type) if not path else (), text)
         raise ConfigError(key + path[:-1], f"{problem}, got {shown(value)}") from None
     if isinstance(converted, float) and not math.isfinite(converted):
         raise ConfigError(key, f"must be finite, got {converted}")
     return converted
 
 
-def _alternatives(kind: object) -> tuple[object, ...]:
+def _alternatives(value_type: object) -> tuple[object, ...]:
     """Return the members of a union, or the type itself, without `Annotated`."""
-    origin, inner = get_origin(kind), get_args(kind)
+    origin, inner = get_origin(value_type), get_args(value_type)
     if origin is Annotated:
         return _alternatives(inner[0])
     if origin in (typing.Union, types.UnionType):
         return tuple(form for part in inner for form in _alternatives(part))
-    return (kind,)
+    return (value_type,)
 
 
 def _expected_value(possible: Iterable[object], text: str) -> str:
@@ -178,18 +178,18 @@ def check_names(
     return values
 
 
-def read_table(kind: type[AnySettings], values: object, where: str = "") -> AnySettings:
+def read_table(settings_class: type[AnySettings], values: object, where: str = "") -> AnySettings:
     """Make settings from a table of JSON or TOML, including its nested tables.
 
     Missing keys have their defaults; ``where`` is the table's key. ConfigError if a key is unknown
     or missing, or a value does not fit.
     """
-    values = check_names(values, kind.__struct_fields__, where)
+    values = check_names(values, settings_class.__struct_fields__, where)
     try:
-        for field in msgspec.structs.fields(kind):
+        for field in msgspec.structs.fields(settings_class):
             if field.required and field.name not in values:
                 raise ConfigError(field.name, "must be given")
-        return kind(**values)
+        return settings_class(**values)
     except ConfigError as error:
         raise ConfigError(_path(where, error.key), error.problem, error.place) from error
 
@@ -211,9 +211,10 @@ def with_changes(base: AnyPart, values: object, where: str, hint: str = "") -> A
         raise ConfigError(f"{where}.n_inputs", "follows from the observations: omit it")
     values = check_names(values, [name for name in names if name != "n_inputs"], where, hint)
     if not fields_of(type(base)):  # a dataclass, which does not check its values
-        kinds = _types_of_fields(base.__class__)
+        types_by_name = _types_of_fields(base.__class__)
         values = {
-            name: convert_value(kinds[name], v, f"{where}.{name}") for name, v in values.items()
+            name: convert_value(types_by_name[name], v, f"{where}.{name}")
+            for name, v in values.items()
         }
     try:
         return dataclasses.replace(base, **values)
@@ -227,8 +228,6 @@ def differences(
 ) -> Values:
     """Return the values that differ from the default, also in tables; ``always`` keeps names.
 
-    Examples
-    --------
     >>> differences({"a": 1, "b": {"c": 2, "d": 3}}, {"a": 1, "b": {"c": 2, "d": 4}})
     {'b': {'d': 3}}
     """
@@ -409,9 +408,9 @@ _TABLES: dict[str, tuple[type[object], ...]] = {
 
 KEYS_BY_NAME = {"environment": "environment", "agent": "agent", "seed": "seed"} | {
     name: f"{table}.{name}"
-    for table, kinds in _TABLES.items()
-    for kind in kinds
-    for name in names_of(kind)
+    for table, classes in _TABLES.items()
+    for settings_class in classes
+    for name in names_of(settings_class)
 }
 """The keys of a specification, with dots between tables, by their last part."""
 

@@ -118,18 +118,16 @@ class RunSpec(Settings, frozen=True):
             value: object = getattr(self, name)
             is_preset = value is None or isinstance(value, PresetSettings)
             self._set(**{name: base if is_preset else with_changes(base, value, name, hint)})
-        pairs = "none" if self.environment.changes_observations else defaults.angle_pairs
-        agent = self.agent
-        history = "none" if agent.missing == "code" else defaults.history
-        self._set(
-            agent=agent.replace(
-                name=entry.id,
-                preset=preset,
-                angle_pairs=pairs if agent.angle_pairs is None else agent.angle_pairs,
-                inputs=defaults.inputs if agent.inputs is None else agent.inputs,
-                history=history if agent.history is None else agent.history,
-            )
-        )
+        agent, is_scaled = self.agent, self.environment.changes_observations
+        followed = {
+            "angle_pairs": "none"
+            if is_scaled
+            else defaults.angle_pairs,  # scaled values are on no circle
+            "inputs": defaults.inputs,
+            "history": "none" if agent.missing == "code" else defaults.history,
+        }
+        missing = {name: v for name, v in followed.items() if getattr(agent, name) is None}
+        self._set(agent=agent.replace(name=entry.id, preset=preset, **missing))
 
     def _chosen_agent(self) -> tuple[AgentEntry, str | None]:
         """Return the agent's entry and preset; a name such as ``"sdnn-c-robust"`` has both."""

@@ -33,11 +33,9 @@ STORE_NAME = "results.sqlite"
 SCHEMA_VERSION = 6
 APPLICATION_ID = int.from_bytes(b"sdnn", "big")
 """Value of SQLite's header field ``application_id`` in files of this library."""
-MOST_BYTES = 2**37
-"""Largest file: SQLite's integrity check needs memory, a bit for each page."""
+MOST_BYTES = 2**37  # largest file: SQLite's integrity check needs memory, a bit for each page
 
-MOST_BYTES_OF_VALUE = 2**24
-"""Longest text in the file."""
+MOST_BYTES_OF_VALUE = 2**24  # longest text in the file
 MOST_MEASUREMENTS = 10**5  # a report has only some hundreds
 _SCHEMA = files("sdnn.runs").joinpath("schema.sql").read_text("utf-8")
 
@@ -136,10 +134,10 @@ class ResultStore(AbstractContextManager["ResultStore"]):
         return recovered
 
     def _prepare(self, is_new: bool) -> None:
+        """Set how the file is written; a new one gets the schema."""
         connection = self._connection
-        connection.execute("PRAGMA journal_mode = DELETE")
-        connection.execute("PRAGMA synchronous = FULL")
-        connection.execute("PRAGMA foreign_keys = ON")
+        for setting in ("journal_mode = DELETE", "synchronous = FULL", "foreign_keys = ON"):
+            connection.execute(f"PRAGMA {setting}")
         if is_new:
             # In a single transaction, a killed process leaves an empty file or the whole schema.
             try:
@@ -198,8 +196,7 @@ class ResultStore(AbstractContextManager["ResultStore"]):
             run = self._run_in_progress(key, config, version)
             hashed = rows.hashed(self._hash_before(run, first))
             self._insert(run.id, rows)
-            seconds += run.seconds
-            checksum = hashed.hexdigest()
+            seconds, checksum = seconds + run.seconds, hashed.hexdigest()
             self._update(run._replace(seconds=seconds, finished_at=None, checksum=checksum))
             self._hashes[run.id] = hashed
 
@@ -253,12 +250,12 @@ class ResultStore(AbstractContextManager["ResultStore"]):
             yield
 
     def _read(
-        self, kind: type[Rows], columns: str, table: str, rest: str, *arguments: object
+        self, row_type: type[Rows], columns: str, table: str, rest: str, *arguments: object
     ) -> Rows:
         """Read columns of a table as a list of tuples, with a type for each column."""
         cursor = self._connection.execute(f"SELECT {columns} FROM {table} {rest}", arguments)
         try:
-            return msgspec.convert(cursor.fetchall(), kind)
+            return msgspec.convert(cursor.fetchall(), row_type)
         except msgspec.ValidationError as error:
             problem, _, place = str(error).partition(" - at ")  # `$[row][column]`
             column = cursor.description[int(place.rpartition("[")[2].rstrip("]`"))][0]
@@ -298,12 +295,14 @@ class ResultStore(AbstractContextManager["ResultStore"]):
         )
 
     def _insert(self, run_id: int, rows: TrialRows) -> None:
+        """Add rows of a run; an unknown step or environment, -1, becomes NULL."""
         self._connection.executemany(
             "INSERT INTO rows VALUES (?, ?, ?, ?, ?, nullif(?, -1), ?, ?, ?, nullif(?, -1))",
             ((run_id, *row) for row in rows.table.tolist()),
         )
 
     def _rows(self, run: _Run) -> TrialRows:
+        """Read the rows of a run; ChangedRowsError if they do not fit its checksum."""
         order = "WHERE run_id = ? ORDER BY number, part"
         rows = TrialRows(np.array(self._read(_Rows, _ROW_COLUMNS, "rows", order, run.id), ROW))
         if rows.checksum() != run.checksum:
@@ -336,9 +335,8 @@ class ResultStore(AbstractContextManager["ResultStore"]):
             (n,) = self._connection.execute("SELECT count(*) FROM measurements").fetchone()
             if n > MOST_MEASUREMENTS:
                 raise StoreError(f"{self.path} holds {n} measurements, over {MOST_MEASUREMENTS}")
-            rows = self._read(
-                list[tuple[str, str, str, int]], "*", "measurements", "ORDER BY kind, key"
-            )
+            row_type = list[tuple[str, str, str, int]]
+            rows = self._read(row_type, "*", "measurements", "ORDER BY kind, key")
             for row in rows:
                 if row[-1] != _crc(row[:-1]):
                     place = f"measurements, kind {row[0]}, key {row[1]}"
@@ -403,11 +401,13 @@ def _inspect(path: Path) -> bool:
 
 
 def _objects(connection: sqlite3.Connection) -> set[tuple[str | None, ...]]:
+    """Return what a database has in its schema: tables, indices, views and triggers."""
     return set(connection.execute("SELECT type, name, tbl_name, sql FROM sqlite_master").fetchall())
 
 
 @cache
 def _own_objects() -> set[tuple[str | None, ...]]:
+    """Return what the schema of this version has, which every file must have."""
     with closing(sqlite3.connect(":memory:")) as connection:
         connection.executescript(_SCHEMA)
         return _objects(connection)

@@ -152,11 +152,12 @@ class Study:
 
     def copies(self) -> dict[str, str]:
         """Map each variant that equals an earlier one in every case to the first equal one."""
-        hashes: dict[str, list[TrialKey]] = {variant.id: [] for variant in self.variants}
+        # Variants are equal whose first trials have equal keys in every case.
+        keys_of: dict[str, list[TrialKey]] = {variant.id: [] for variant in self.variants}
         for case, variant in self.combinations:
-            hashes[variant].append(self.keys(case, variant)[0])
-        firsts: dict[tuple[TrialKey, ...], str] = {}
-        first_of = {name: firsts.setdefault(tuple(keys), name) for name, keys in hashes.items()}
+            keys_of[variant].append(self.keys(case, variant)[0])
+        variants: dict[tuple[TrialKey, ...], str] = {}
+        first_of = {name: variants.setdefault(tuple(keys), name) for name, keys in keys_of.items()}
         return {name: first for name, first in first_of.items() if first != name}
 
     def check(self, stored: Collection[TrialKey] = ()) -> None:

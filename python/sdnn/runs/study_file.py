@@ -42,14 +42,11 @@ from sdnn.support.toml import KeyPath, dotted
 
 DEFAULT = "default"
 """The variant that others are compared with, if it exists and the file names no other."""
-BASE = "base"
-"""Name of the variant without overrides, if axes vary one at a time or nothing varies."""
+BASE = "base"  # name of the variant without overrides, if axes vary one at a time or nothing varies
 
 MOST_TRIALS = 100_000
-MOST_COMBINATIONS = 5_000
-"""Most combinations of a variant and a case."""
-MOST_SETTINGS = 5_000
-"""Most settings of a table."""
+MOST_COMBINATIONS = 5_000  # most combinations of a variant and a case
+MOST_SETTINGS = 5_000  # most settings of a table
 
 _DEPTHS: dict[tuple[str, ...], int] = {("environment", "kwargs"): 4, ("environment", "ranges"): 3}
 """Number of parts of keys in tables whose keys are not fixed; elsewhere keys have two parts."""
@@ -107,14 +104,9 @@ class StudyFile(Study):
     ConfigError if the file cannot be read, or has something unknown or impossible; the message
     names file, line and key. What only agents and environments refuse is found by `check`.
 
-    Parameters
-    ----------
-    path
-        A TOML file; ``docs/how-to/studies.md`` describes it.
-    n_trials, seed
-        See `Study`; instead of the file's.
-    only
-        Ids of the variants to run; none: all. A ValueError if there is no variant of a name.
+    ``path`` is a TOML file, which ``docs/how-to/studies.md`` describes; ``n_trials`` and ``seed``
+    replace the file's. ``only`` are ids of the variants to run, by default all; ValueError for an
+    unknown one.
     """
 
     known_cases: ClassVar[Mapping[str, StudyCase]] = {}
@@ -203,6 +195,7 @@ class StudyFile(Study):
             raise self.refusal(case, variant, settings, error) from error
 
     def _values(self, case: StudyCase, settings: Layer) -> Values:
+        """Return settings as the tables of a specification, with the defaults of the case."""
         values = {".".join(name): setting.value for name, setting in settings.items()}
         return self.completed(case, overridden({}, values))
 

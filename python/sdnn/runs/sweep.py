@@ -244,8 +244,7 @@ def study_page(
     )
 
 
-ONLY_IN_FULL = ("early steps", "final steps")
-"""Measures that a terminal leaves out by default."""
+ONLY_IN_FULL = ("early steps", "final steps")  # measures that a terminal leaves out by default
 
 
 def _case_sections(comparison: Comparison) -> Iterator[Section]:
@@ -257,7 +256,7 @@ def _case_sections(comparison: Comparison) -> Iterator[Section]:
         end = ("end solved",) if any(m.solved_at_end is not None for m in measured) else ()
         rows = [
             (m.variant.title, title_of(m.result.agent), str(m.result.n_trials),
-             *(m.end_solved for _ in end), *measure_cells(m.result, names))
+             *((m.end_solved,) if end else ()), *measure_cells(m.result, names))
             for m in measured
         ]  # fmt: skip
         header = ("variant", "agent", "trials", *end, *measures, *MEASURE_END)
@@ -271,6 +270,7 @@ def _case_sections(comparison: Comparison) -> Iterator[Section]:
 
 
 def _difference(measured: Measured, name: MeasureName) -> str:
+    """Write the mean difference from the reference; an asterisk marks what differs from it."""
     text = format_estimate(measured.differences.get(name), name, sign="+")
     return text + (" *" if measured.differs(name) else "")
 
@@ -326,12 +326,11 @@ def trial_table(comparison: Comparison) -> tuple[tuple[str, ...], list[tuple[obj
         "case", "variant", "agent", "trial", "seed", "config_hash", "version", *names, "decisions",
         "seconds",
     )  # fmt: skip
-    rows: list[tuple[object, ...]] = [
-        (case, variant, r.key.agent, r.key.trial, r.key.seed, r.key.config_hash, r.version,
-         *(values[name][n] if name in values else "" for name in names),
-         r.n_decisions, round(r.seconds, 3))
-        for (case, variant), measured in pairs
-        for values in [measured.result.values]
-        for n, r in enumerate(measured.result.records)
-    ]  # fmt: skip
+    rows: list[tuple[object, ...]] = []
+    for pair, measured in pairs:
+        for n, record in enumerate(measured.result.records):
+            values = {name: column[n] for name, column in measured.result.values.items()}
+            measures = (values.get(name, "") for name in names)
+            end = record.n_decisions, round(record.seconds, 3)
+            rows.append((*pair, *record.key[1:], record.version, *measures, *end))
     return header, rows

@@ -67,8 +67,7 @@ def trial_seed(root_seed: int, case_id: str, trial: int) -> int:
 Column: TypeAlias = NDArray[np.int32 | np.float64 | np.bool_]
 """A column with a number for each evaluation: its only episode's, or the mean over episodes."""
 
-HASH_DIGITS = 16
-"""Hexadecimal digits kept of a text's SHA-256: 64 bits."""
+HASH_DIGITS = 16  # hexadecimal digits kept of a text's SHA-256: 64 bits
 
 
 def canonical_json(values: Mapping[str, object]) -> str:
@@ -78,6 +77,7 @@ def canonical_json(values: Mapping[str, object]) -> str:
 
 
 def _canonical_number(text: str) -> int | float:
+    """Read a number of JSON that has a point or exponent; a whole one becomes an int."""
     value = float(text)
     return int(value) if value.is_integer() else value
 
@@ -85,8 +85,6 @@ def _canonical_number(text: str) -> int | float:
 def config_hash(text: str) -> str:
     """Return the first 16 hexadecimal digits of the SHA-256 of a text.
 
-    Examples
-    --------
     >>> config_hash(canonical_json({"noise": 0.0})) == config_hash(canonical_json({"noise": 0}))
     True
     """
@@ -182,11 +180,11 @@ class TrialRows:
         tests = self.table[self.table["kind"] == "evaluation"]
         return tests, np.flatnonzero(tests["part"] == 0)
 
-    def _column(self, name: str, kind: type[np.generic]) -> Column:
+    def _column(self, name: str, dtype: type[np.generic]) -> Column:
         """Return a column of the tests; where a test had several episodes, their mean."""
         tests, starts = self._tests
         if len(starts) == len(tests):
-            return tests[name].astype(kind)
+            return tests[name].astype(dtype)
         sums = np.add.reduceat(tests[name].astype(np.float64), starts)
         return np.asarray(sums / np.diff([*starts, len(tests)]))
 
@@ -220,8 +218,8 @@ class TrialRows:
         """Return the SHA-256 of the test episodes, independent of the machine's byte order."""
         tests, _ = self._tests
         sha = hashlib.sha256()
-        for name, kind in _COLUMNS.items():
-            sha.update(tests[name].astype(kind).tobytes())
+        for name, dtype in _COLUMNS.items():
+            sha.update(tests[name].astype(dtype).tobytes())
         return sha.hexdigest()
 
     def checksum(self) -> str:

@@ -170,21 +170,11 @@ def verify(
     The rows of the other stored trials are compared with their checksums only. Where a training in
     Python differs, it is run once more, to tell environments that do not repeat themselves.
 
-    Parameters
-    ----------
-    reports
-        Where the trials are: `StoredReports`, `CertifiedReports`.
-    n_trials, cases, seed
-        Which trials; see `choose_trials`.
-    consent
-        Modules that may be imported; none by default.
-    executor, observer
-        See `sdnn.runs.engine.run_trials`.
+    ``reports`` has the trials: `StoredReports`, `CertifiedReports`; `choose_trials` draws from them
+    by ``n_trials``, ``cases`` and ``seed``. ``consent`` names modules that may be imported, by
+    default none. For the executor and the observer see `sdnn.runs.engine.run_trials`.
 
-    Raises
-    ------
-    RunError
-        If there is no finished trial, or a file is damaged in other ways than changed rows.
+    RunError if there is no finished trial, or a file is damaged in other ways than changed rows.
     """
     instruction_set()  # raises if the environment variable is wrong
     observe: Observer = observer or (lambda _: None)

@@ -14,8 +14,7 @@ _PIECE_CHARACTERS = 2**20
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """First characters of cells that a spreadsheet runs, unless they are numbers."""
 _NUMBER = re.compile(r"[+-]?\.?\d[\d.]*(e[+-]?\d+)?")
-_GZIP = 31
-"""zlib's ``wbits`` for a window of 2**15 bytes and gzip's header."""
+_GZIP = 31  # zlib's `wbits` for a window of 2**15 bytes and gzip's header
 
 
 def csv_bytes(header: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:

@@ -27,8 +27,7 @@ from numpy.typing import NDArray
 
 from sdnn._core import __version__
 
-PARTIAL_SUFFIX = ".partial"
-"""Suffix of a file that is being written."""
+PARTIAL_SUFFIX = ".partial"  # suffix of a file that is being written
 _NAME_OF_PARTIAL = re.compile(r"\.[0-9a-f]{16}\.partial$")
 _ABANDONED_SECONDS = 60
 """Age of a partial file that counts as abandoned, on file systems without locks."""

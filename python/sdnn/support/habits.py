@@ -133,7 +133,9 @@ def advice(
     if not sentence:  # a suggestion must be more alike
         hints += difflib.get_close_matches(name, known, n=1, cutoff=0.7)
         hints += map(elsewhere.__getitem__, difflib.get_close_matches(name, elsewhere, 1, 0.8))
-    hint = f"did you mean {hints[0]}? " if hints else f"{sentence}; " if sentence else ""
+    hint = f"{sentence}; " if sentence else ""
+    if hints:
+        hint = f"did you mean {hints[0]}? "
     listed = ", ".join(dict.fromkeys([*near, *known]))
     return f"{hint}possible: {listed}" if known else hint.strip("; ")
 

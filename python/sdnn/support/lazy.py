@@ -16,8 +16,6 @@ def attach(
     modules. Type checkers read them in the stub beside the package, which a frozen program lacks.
     Errors about a name that is in one of the packages ``others`` say so.
 
-    Examples
-    --------
     >>> load, names, public = attach("sdnn", {"sdnn": "coding", "sdnn.estimators": "SDNNRegressor"})
     >>> load("coding").__name__, names(), public
     ('sdnn.coding', ['SDNNRegressor', 'coding'], ['SDNNRegressor', 'coding'])

@@ -85,8 +85,6 @@ def instruction_set() -> str:
 def available_instruction_sets() -> tuple[str, ...]:
     """Return the levels that can be chosen here, the best one last.
 
-    Examples
-    --------
     >>> available_instruction_sets()[0]
     'portable'
     """

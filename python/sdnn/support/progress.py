@@ -11,10 +11,8 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import TaskID
 
-_SPEED_SECONDS = 60.0
-"""Time over which the speed is averaged for the time left."""
-_NOTEBOOK_SECONDS = 0.25
-"""Time between two changes of a notebook's output."""
+_SPEED_SECONDS = 60.0  # time over which the speed is averaged for the time left
+_NOTEBOOK_SECONDS = 0.25  # time between two changes of a notebook's output
 
 
 class ProgressBars:

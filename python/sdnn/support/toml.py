@@ -13,11 +13,9 @@ from typing import TypeAlias, cast
 
 import msgspec
 
-MOST_LEVELS = 32
-"""Largest depth of nested tables and arrays."""
+MOST_LEVELS = 32  # largest depth of nested tables and arrays
 TOO_DEEP = f"must have at most {MOST_LEVELS} tables and arrays within each other"
-_MOST_PARSED = 2**21
-"""Bytes that are parsed to find a line; in larger files none is found."""
+_MOST_PARSED = 2**21  # bytes that are parsed to find a line; in larger files none is found
 
 KeyPath: TypeAlias = tuple[str | int, ...]
 """Keys from the top of a document to a value; elements of arrays are numbers from 0."""
@@ -71,8 +69,10 @@ def deep_key(value: object, key: KeyPath = ()) -> KeyPath | None:
     if len(key) == MOST_LEVELS:
         return key
     items = value.items() if isinstance(value, dict) else enumerate(cast("list[object]", value))
-    inner = (((*key, name), item) for name, item in items if isinstance(item, dict | list))
-    return next((deep for at, item in inner if (deep := deep_key(item, at))), None)
+    for name, item in items:
+        if isinstance(item, dict | list) and (deep := deep_key(item, (*key, name))):
+            return deep
+    return None
 
 
 def leaves(table: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:
@@ -91,8 +91,6 @@ def leaves(table: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str,
 def dotted(key: KeyPath) -> str:
     """Write a key as TOML would.
 
-    Examples
-    --------
     >>> dotted(("axes", "learning.tie_rule", 1))
     'axes."learning.tie_rule"[1]'
     """

@@ -7,6 +7,8 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any
@@ -23,8 +25,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 MOST_BYTES_OF_ROWS = 2**32
-SHOWN_AFTER = 5.0
-"""Seconds of a training after which its bar appears."""
+SHOWN_AFTER = 5.0  # seconds of a training after which its bar appears
 
 
 @explained
@@ -264,11 +265,9 @@ class TensorBoard(Callback):
 def _summary_writer() -> Callable[[str], Any]:
     """Return the class that writes TensorBoard files, of the first package that has it."""
     for module in ("tensorboardX", "torch.utils.tensorboard"):
-        try:
-            make: Callable[[str], Any] = __import__(module, fromlist=["x"]).SummaryWriter
-        except ImportError:
-            continue
-        return make
+        with suppress(ImportError):
+            make: Callable[[str], Any] = import_module(module).SummaryWriter
+            return make
     raise ImportError("TensorBoard rows need tensorboardX: pip install tensorboardX")
 
 

@@ -30,11 +30,9 @@ from sdnn.training.interfaces import (
     warn_of_endless_episode,
 )
 
-_LEARNING, EVALUATION = 0, 1
-"""The kinds of episodes that `episode_seed` gives seeds to."""
+_LEARNING, EVALUATION = 0, 1  # purposes of episodes, for `episode_seed`
 
-_ENDLESS = 10_000
-"""Steps after which an episode seems to have no end."""
+_ENDLESS = 10_000  # steps after which an episode seems to have no end
 
 _OLD_API = (
     "; an environment of Gym before 0.26 can be wrapped:"
@@ -162,10 +160,11 @@ class SingleEnvironment(EnvironmentAdapter):
         return [observation]
 
 
-def episode_seed(seed: int, kind: int, episode: int) -> int:
-    """Return the seed of an episode's `reset`; learning and evaluation draw different seeds."""
-    word = np.random.SeedSequence(seed, spawn_key=(kind, episode)).generate_state(1, np.uint32)[0]
-    return int(word) % 2**31  # some environments refuse larger seeds
+def episode_seed(seed: int, purpose: int, episode: int) -> int:
+    """Return the seed of an episode's `reset`: another one for learning than for evaluation."""
+    sequence = np.random.SeedSequence(seed, spawn_key=(purpose, episode))
+    word = int(sequence.generate_state(1, np.uint32)[0])
+    return word % 2**31  # some environments refuse larger seeds
 
 
 @dataclass(slots=True, eq=False)
@@ -347,18 +346,17 @@ class Episodes:
 
     def saved(self, shape: tuple[int, ...]) -> list[SavedEpisode | None]:
         """Return the present episodes for a file; ``shape`` is the shape of an action."""
-        return [
-            None
-            if episode is None
-            else SavedEpisode(
-                number=episode.number,
-                sum_of_rewards=episode.sum_of_rewards,
-                actions=episode.actions.array().reshape((-1, *shape)),
-                observation=self._learner.flat(self.observations[i]),
-                waits=i in self.unlearned,
-            )
-            for i, episode in enumerate(self.present)
-        ]
+        saved: list[SavedEpisode | None] = [None] * self.n_environments
+        for i, episode in enumerate(self.present):
+            if episode is not None:
+                saved[i] = SavedEpisode(
+                    number=episode.number,
+                    sum_of_rewards=episode.sum_of_rewards,
+                    actions=episode.actions.array().reshape((-1, *shape)),
+                    observation=self._learner.flat(self.observations[i]),
+                    waits=i in self.unlearned,
+                )
+        return saved
 
     def repeat(self, saved: Sequence[SavedEpisode | None]) -> None:
         """Replay saved episodes, so that every environment is in the state in which it was saved.

@@ -153,15 +153,17 @@ def _learned_numbers(wrapper: object) -> Iterator[tuple[str, object, str]]:
 
 
 def _has_shapes_of(wrapper: object, learned: Statistics) -> bool:
+    """Return whether statistics are of the wrapper's class, with numbers of its shapes."""
     shapes = {name: np.shape(getattr(owner, key)) for name, owner, key in _learned_numbers(wrapper)}
     learned_shapes = {name: numbers.shape for name, numbers in learned.numbers.items()}
     return type(wrapper).__name__ == learned.wrapper and shapes == learned_shapes
 
 
 def _packed(value: object) -> _Numbers:
+    """Convert a number or an array; all but float32 become float64."""
     array = np.asarray(value)
-    array = array.astype("<f4" if array.dtype == np.float32 else "<f8")
-    return _Numbers("<f4" if array.itemsize == 4 else "<f8", array.shape, array.tobytes())
+    dtype: Literal["<f4", "<f8"] = "<f4" if array.dtype == np.float32 else "<f8"
+    return _Numbers(dtype, array.shape, array.astype(dtype).tobytes())
 
 
 def _unpacked(numbers: _Numbers) -> Array:
@@ -200,17 +202,15 @@ def fixed_statistics(env: object, learned: Sequence[Statistics]) -> Iterator[Non
 
 
 def _has_no_statistics(wrapper: object) -> bool:
+    """Return whether a wrapper that learns statistics has observed nothing yet."""
     all_moments = (moments_of(wrapper, name) for name in _STATISTICS)
     return any(moments is not None and moments.count < _FEW for moments in all_moments)
 
 
-_ARRAYS_OF_TRAINING = "training."
-"""Prefix of the names of arrays that are not the agent's."""
+_ARRAYS_OF_TRAINING = "training."  # prefix of the names of arrays that are not the agent's
 
-_LARGEST_RETURN = 1e300
-"""Returns that count as larger ones, so that sums of a block are finite."""
-MOST_IN_BLOCK = 10**6
-"""Largest number of episodes in a block."""
+_LARGEST_RETURN = 1e300  # returns that count as larger ones, so that sums of a block are finite
+MOST_IN_BLOCK = 10**6  # largest number of episodes in a block
 
 _Sum = Annotated[float, msgspec.Meta(ge=-1e307, le=1e307)]
 _BlockLength = Annotated[int, msgspec.Meta(ge=1, le=MOST_IN_BLOCK)]
@@ -243,8 +243,7 @@ _SCALARS = (np.generic, int, float)
 """Immutable types of observations and actions, which need no copy."""
 
 
-MOST_RECENT = 1024
-"""Rounds of steps after which the recent actions of all episodes become arrays."""
+MOST_RECENT = 1024  # rounds of steps after which the recent actions of all episodes become arrays
 
 
 def copied(value: Element) -> Element:
@@ -362,6 +361,7 @@ def write_training(path: Path, agent: Any, training: SavedTraining) -> None:
 
 
 def _without_arrays(value: Any) -> Any:
+    """Convert what JSON lacks: NumPy's numbers; arrays, which are stored apart, become null."""
     return None if isinstance(value, np.ndarray) else value.item()
 
 
@@ -371,15 +371,16 @@ def read_training(path: Path) -> tuple[Any, SavedTraining]:
     OSError if the file cannot be read; ValueError if it is damaged or holds no training.
     """
     agent, description, arrays = read_agent(path, "training")
-
     may_lack_readings = agent.missing != "error"
 
     def array(name: str) -> Array:
+        """Return an array; ValueError if it is missing, or has NaN where readings cannot lack."""
         if name not in arrays or not (may_lack_readings or np.isfinite(arrays[name]).all()):
             raise ValueError(f"{path} is damaged: {name} must be there, of numbers")
         return arrays[name]
 
     def actions(name: str) -> Array:
+        """Return an array of actions of the agent; ValueError if it holds something else."""
         if not Actions(agent.action_space).hold(array(name)):
             raise ValueError(f"{path} is damaged: {name} must be actions of {agent.action_space}")
         return arrays[name]

@@ -339,7 +339,7 @@ class TrainingLoop(abc.ABC):
         return failure
 
     def _set_progress(self, is_episode_over: bool) -> None:
-        """Set the learner's ``progress``, from which its schedules follow."""
+        """Set the learner's ``progress``; that in episodes changes where one is over."""
         learner = self._learner.progressing
         if learner is None:
             return
@@ -425,12 +425,12 @@ class TrainingLoop(abc.ABC):
             self.agent.wrappers = statistics_of(self._episodes.wrappers)
 
     def _options(self, episode: int) -> Data | None:
+        """Return the options of the reset for a number of episodes; None without a function."""
         if self.reset_options is None:
             return None
-        options = self.reset_options(episode)
-        is_mapping = isinstance(options, Mapping)
-        require(is_mapping, "reset_options", "return a mapping", options, TypeError)
-        return dict(options)
+        made = self.reset_options(episode)
+        require(isinstance(made, Mapping), "reset_options", "return a mapping", made, TypeError)
+        return dict(made)
 
     @abc.abstractmethod
     def _find_listeners(self) -> Sequence[tuple[int, Any]]:

@@ -32,8 +32,7 @@ from sdnn.training.loop import Row, TrainingLoop, learner_for_all
 _SETTINGS = (
     "seed", "evaluate_every", "evaluate_every_episodes", "evaluation_episodes", "limit_bootstraps"
 )  # fmt: skip
-_STATE = ("n_steps", "n_episodes", "n_rows", "evaluations")
-"""Attributes that are saved as they are."""
+_STATE = ("n_steps", "n_episodes", "n_rows", "evaluations")  # attributes that are saved as they are
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -400,6 +399,7 @@ class CheckpointCallback(Callback):
 
 
 def _optional(name: str, value: float | None) -> int | None:
+    """Check a number of steps or episodes, which may be None, or a float that is whole."""
     if isinstance(value, float) and value.is_integer():  # such as 1e5
         value = int(value)
     return None if value is None else whole(name, value, 1, 2**53)

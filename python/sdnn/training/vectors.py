@@ -35,7 +35,6 @@ class _SyncEnvironments(EnvironmentAdapter):
         self._env = env
         self._adapters = [SingleEnvironment(single) for single in env.envs]
         self._space = env.single_observation_space
-        self._shape, self._dtype = self._space.shape, self._space.dtype
         self.n_environments = env.num_envs
         self.masks = [None] * env.num_envs if announces(env, "action_masks") else None
         self.dts = [1.0] * env.num_envs if announces(env, "durations") else None
@@ -72,14 +71,12 @@ class _SyncEnvironments(EnvironmentAdapter):
 
         Observations that do not fit are returned unchanged: the agent's error names them.
         """
-        space, shape, dtype = self._space, self._shape, self._dtype
+        space, dtype = self._space, self._space.dtype
         for observation in observations:
             if type(observation) is not ndarray or observation.dtype is not dtype:
                 break
-            if observation.shape != shape:
-                return observations
         else:
-            return observations
+            return observations  # nothing is to be converted
         if any(has_mask(space, observation) for observation in observations):
             return observations  # the vector's arrays would drop the mask of a masked array
         batch: Any = create_empty_array(space, len(observations))

@@ -153,7 +153,7 @@ def test_an_angle_is_one_input_in_degrees():
     assert (actions[(degrees > 20) & (degrees < 160)] == 1.0).mean() > 0.9
     assert (actions[(degrees > -160) & (degrees < -20)] == 0.0).mean() > 0.9
     placed = states.rows[:3].copy()
-    angle.place(placed, np.array([90.0, -90.0, 180.0]))
+    angle.write(placed, np.array([90.0, -90.0, 180.0]))
     np.testing.assert_allclose(placed[:, :2], [[0, 1], [0, -1], [-1, 0]], atol=1e-12)
     np.testing.assert_allclose(angle.numbers(placed), [90.0, -90.0, 180.0])
 
@@ -292,7 +292,7 @@ def test_constant_numbers_have_a_range_and_symbols_a_most_frequent_one():
     assert AgentInput("x", "variable", (0,)).limits(states) == (1.5, 2.5)
     symbol = AgentInput("y", "symbol", (1, 2))
     assert symbol.typical(states) == 1.0
-    symbol.place(states, np.zeros(3))
+    symbol.write(states, np.zeros(3))
     np.testing.assert_array_equal(states[:, 1:], [[1, 0]] * 3)
 
 
