@@ -21,14 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn import _core
+from sdnn.support import machine
 from sdnn.support.interrupts import thread_pool
-from sdnn.support.machine import (
-    available_instruction_sets,
-    instruction_set,
-    n_cores,
-    processor,
-    set_instruction_set,
-)
 
 Nanoseconds: TypeAlias = NDArray[np.int64]
 Run: TypeAlias = Callable[[int], Nanoseconds]
@@ -69,9 +63,9 @@ def run_benchmarks(*, quick: bool = False) -> dict[str, object]:
         "date": date.today().isoformat(),
         "quick": quick,
         "machine": describe_machine(),
-        "instruction_set": instruction_set(),
-        "best_instruction_set": available_instruction_sets()[-1],
-        "instruction_sets": list(available_instruction_sets()),
+        "instruction_set": machine.instruction_set(),
+        "best_instruction_set": machine.available_instruction_sets()[-1],
+        "instruction_sets": list(machine.available_instruction_sets()),
         "networks": [measure_network(n_inputs, effort) for n_inputs in NETWORK_INPUTS],
         "acrobot": measure_acrobot(effort),
         "decisions": [measure_decisions(*case, effort) for case in CASES],
@@ -82,9 +76,9 @@ def run_benchmarks(*, quick: bool = False) -> dict[str, object]:
 def describe_machine() -> dict[str, object]:
     """Describe this machine; ``n_cores`` are those that this process may use."""
     return {
-        "processor": processor(),
+        "processor": machine.processor(),
         "system": f"{platform.system()} {platform.machine()}",
-        "n_cores": n_cores(),
+        "n_cores": machine.n_cores(),
         "python": platform.python_version(),
         "numpy": np.__version__,
     }
@@ -121,7 +115,7 @@ def measure_network(n_inputs: int, effort: Effort) -> dict[str, object]:
     """
     parts = network_parts(n_inputs, effort)
     config = _core.SDNNCConfig(n_inputs=n_inputs)
-    levels = available_instruction_sets()
+    levels = machine.available_instruction_sets()
     runs: dict[str, Run] = {
         **{level: at_level(level, parts.time_values) for level in levels},
         "remembered_values": parts.time_remembered_values,
@@ -246,11 +240,11 @@ def at_level(level: str, run: Run) -> Run:
 
     def _run(n: int) -> Nanoseconds:
         """Call `run` under the instruction set `level`, then restore the previous one."""
-        before = instruction_set()
-        set_instruction_set(level)
+        before = machine.instruction_set()
+        machine.set_instruction_set(level)
         try:
             return run(n)
         finally:
-            set_instruction_set(before)
+            machine.set_instruction_set(before)
 
     return _run

@@ -17,21 +17,13 @@ from sklearn.utils.validation import check_is_fitted
 
 from sdnn.coding import RandomInverse
 from sdnn.coding.kernel import N_UNITS, AnalyticKernel
+from sdnn.estimators import ridge
 from sdnn.estimators.columns import Array, Floats, PairChoice, input_pairs
 from sdnn.estimators.input_choice import Inputs, all_inputs, inputs_to_compare, squared_losses
 from sdnn.estimators.inputs import CodedClassifier, CodedInputs, CodedRegressor
 from sdnn.estimators.intervals import coverage_of, error_bounds, log_sizes
 from sdnn.estimators.kernel_of_samples import KernelOfSamples
 from sdnn.estimators.parameters import RandomState, documents, parameter, wholes, words
-from sdnn.estimators.ridge import (
-    Samples,
-    Solution,
-    apply_degree,
-    diagonal,
-    low_rank_diagonal,
-    solve,
-    solve_for,
-)
 from sdnn.estimators.training import Rows, class_weights, sample_weights
 from sdnn.support.arguments import explains_names, flag, real
 
@@ -42,13 +34,13 @@ LOG_STEEPNESS = (0.0, 5.0)  # bounds of the logarithm of the steepness of the so
 LOG_OF_TEN = np.log(10.0)
 
 
-def log_losses(samples: Samples, left_out: Floats, steepness: float) -> Floats:
+def log_losses(samples: ridge.Samples, left_out: Floats, steepness: float) -> Floats:
     """Return the log loss of each sample by the outputs of the model without it."""
     losses: Floats = -(samples.targets * log_softmax(steepness * left_out, axis=1)).sum(axis=1)
     return losses
 
 
-def steepness_of(samples: Samples, left_out: Floats) -> float:
+def steepness_of(samples: ridge.Samples, left_out: Floats) -> float:
     """Return the steepness of the softmax with the smallest weighted log loss."""
 
     def loss(log_steepness: float) -> float:
@@ -151,7 +143,7 @@ class BaseKernelRidge(CodedInputs):
         return "\n".join(lines)
 
     @staticmethod
-    def _losses(samples: Samples, left_out: Floats) -> Floats:
+    def _losses(samples: ridge.Samples, left_out: Floats) -> Floats:
         """Return each sample's loss from the output without it, by which inputs are chosen."""
         return squared_losses(samples, left_out)
 
@@ -169,7 +161,7 @@ class BaseKernelRidge(CodedInputs):
         factors: Floats | None = None,
         *,
         models_errors: bool = False,
-    ) -> tuple[Floats, Rows, Solution | None]:
+    ) -> tuple[Floats, Rows, ridge.Solution | None]:
         """Learn ranges, kernel, settings and solution; samples weigh counts times factors.
 
         Returns the outputs of samples by models without them, the numbers of these samples, and
@@ -178,7 +170,7 @@ class BaseKernelRidge(CodedInputs):
         if (largest := np.abs(targets).max()) > LARGEST_TARGET:
             raise ValueError(f"y must be within +-{LARGEST_TARGET:g}, got {largest:g}: scale it")
         weights = counts if factors is None else counts * factors
-        samples = Samples(targets, weights, 1 / np.maximum(counts, 1))
+        samples = ridge.Samples(targets, weights, 1 / np.maximum(counts, 1))
         degrees = DEGREES if self.degree == "auto" else (int(self.degree),)
         codings = self._fit_codings(self._codings(X, table), table, N_UNITS)
         self.codings_, possible = tuple(codings), [all_inputs(len(codings))]
@@ -199,8 +191,10 @@ class BaseKernelRidge(CodedInputs):
         self._of_samples = KernelOfSamples(self.kernel_, self.X_fit_, self.degree_)
         if not is_exact:
             table, kernel_of = self._inputs.of(table, codings), self._of_samples.matrix
-            problem = low_rank_diagonal(lambda rows: kernel_of(table[rows]), components, samples)
-            solution = solve(problem, samples, alpha)
+            problem = ridge.low_rank_diagonal(
+                lambda rows: kernel_of(table[rows]), components, samples
+            )
+            solution = ridge.solve(problem, samples, alpha)
         self.alpha_, self.leave_one_out_error_ = solution.alpha, solution.error
         self.dual_coef_, self.intercept_ = solution.dual, solution.intercept
         return solution.left_out, solution.rows, sizes
@@ -211,11 +205,11 @@ class BaseKernelRidge(CodedInputs):
         degrees: Sequence[int],
         table: Array,
         rows: Rows,
-        samples: Samples,
+        samples: ridge.Samples,
         alpha: float | None,
         *,
         models_errors: bool,
-    ) -> tuple[Solution, Solution | None]:
+    ) -> tuple[ridge.Solution, ridge.Solution | None]:
         """Choose inputs and degree by leave-one-out errors; ``samples`` are those of the ``rows``.
 
         Returns the solution, and with `models_errors` that of the logarithms of the errors' sizes.
@@ -226,11 +220,11 @@ class BaseKernelRidge(CodedInputs):
             base = kernel(values[rows])
             solutions, models = {}, {}
             for degree in degrees:
-                problem = diagonal(apply_degree(base.copy(), degree), samples)
-                solutions[degree] = solve(problem, samples, alpha)
+                problem = ridge.diagonal(ridge.apply_degree(base.copy(), degree), samples)
+                solutions[degree] = ridge.solve(problem, samples, alpha)
                 if models_errors:
                     errors = log_sizes(samples.targets - solutions[degree].left_out)
-                    model = solve_for(problem, samples, errors)
+                    model = ridge.solve_for(problem, samples, errors)
                     models[degree] = dataclasses.replace(model, rows=rows)
                 del problem  # free its memory before the next degree needs as much
             best = min(solutions, key=lambda degree: solutions[degree].error)
@@ -395,10 +389,10 @@ class SDNNKernelClassifier(CodedClassifier, BaseKernelRidge):
         of_classes = class_weights(self.class_weight, labels)
         left_out, rows, _ = self._solve(X, table, one_hot, counts, of_classes)
         weights = (counts if of_classes is None else counts * of_classes)[rows]
-        self.steepness_ = steepness_of(Samples(one_hot[rows], weights, weights), left_out)
+        self.steepness_ = steepness_of(ridge.Samples(one_hot[rows], weights, weights), left_out)
 
     @staticmethod
-    def _losses(samples: Samples, left_out: Floats) -> Floats:
+    def _losses(samples: ridge.Samples, left_out: Floats) -> Floats:
         return log_losses(samples, left_out, steepness_of(samples, left_out))
 
     def decision_function(self, X: ArrayLike) -> Floats:

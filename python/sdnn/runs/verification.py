@@ -9,15 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sdnn._core import __version__
-from sdnn.runs.engine import (
-    Counted,
-    Executor,
-    Failed,
-    Finished,
-    Observer,
-    PlannedTrial,
-    execute,
-)
+from sdnn.runs import engine
 from sdnn.runs.errors import ConfigError, RunError
 from sdnn.runs.reported import Consent, ReportedTrial, Reports
 from sdnn.runs.run import Goal
@@ -54,7 +46,7 @@ class _NewGoals(Callback):
 
 
 @dataclass(frozen=True)
-class ResumedTrial(PlannedTrial):
+class ResumedTrial(engine.PlannedTrial):
     """A training whose goal was changed by `sdnn resume`."""
 
     goals: tuple[Goal, ...] = ()
@@ -162,8 +154,8 @@ def verify(
     cases: Collection[str] = (),
     seed: int | None = None,
     consent: Consent | None = None,
-    executor: Executor | None = None,
-    observer: Observer | None = None,
+    executor: engine.Executor | None = None,
+    observer: engine.Observer | None = None,
 ) -> Verification:
     """Run some reported trials again on this machine, and compare them bit by bit.
 
@@ -177,14 +169,14 @@ def verify(
     RunError if there is no finished trial, or a file is damaged in other ways than changed rows.
     """
     instruction_set()  # raises if the environment variable is wrong
-    observe: Observer = observer or (lambda _: None)
+    observe: engine.Observer = observer or (lambda _: None)
     if not reports.keys:
         unfinished = f", and {reports.n_unfinished} unfinished" if reports.n_unfinished else ""
         raise RunError(f"{reports.title} holds no finished trial{unfinished}")
     chosen = set(choose_trials(reports.keys, n_trials, cases=cases, seed=seed))
     others = sorted(set(reports.keys) - chosen)
     for number, is_intact in enumerate(reports.check(others)):
-        observe(Counted("checksums of the other trials", number + 1, len(others)))
+        observe(engine.Counted("checksums of the other trials", number + 1, len(others)))
         if not is_intact:
             chosen.add(others[number])  # running it shows which row has changed
     reported = {trial.key: trial for trial in reports.load(chosen)}
@@ -223,7 +215,7 @@ def verify(
 
 def _plan(
     reported: Iterable[ReportedTrial], reports: Reports, consent: Consent
-) -> tuple[list[PlannedTrial], dict[TrialKey, Difference]]:
+) -> tuple[list[engine.PlannedTrial], dict[TrialKey, Difference]]:
     """Return the trials to run, and those whose configuration cannot be used."""
     plan, differences = [], {}
     for trial in reported:
@@ -235,22 +227,22 @@ def _plan(
             differences[key] = Difference(key, problem, _about(trial, reports), was_run=False)
             continue
         resumed = ResumedTrial(key, spec, trial.goals)
-        plan.append(resumed if trial.goals else PlannedTrial(key, spec))
+        plan.append(resumed if trial.goals else engine.PlannedTrial(key, spec))
     return plan, differences
 
 
 def _run(
-    plan: Sequence[PlannedTrial], executor: Executor | None, observe: Observer
+    plan: Sequence[engine.PlannedTrial], executor: engine.Executor | None, observe: engine.Observer
 ) -> tuple[Mapping[TrialKey, TrialRecord | Exception], int | None]:
     """Run trials without storing them; return records or errors by key, and a received signal."""
     results: dict[TrialKey, TrialRecord | Exception] = {}
 
-    def keep(ended: Sequence[Finished | Failed]) -> None:
+    def keep(ended: Sequence[engine.Finished | engine.Failed]) -> None:
         for message in ended:
-            result = message.error if isinstance(message, Failed) else message.record
+            result = message.error if isinstance(message, engine.Failed) else message.record
             results[message.planned.key] = result
 
-    _, signal = execute(plan, keep, executor, observe)
+    _, signal = engine.execute(plan, keep, executor, observe)
     return results, signal
 
 
