@@ -6,14 +6,7 @@ from pathlib import Path
 
 import click
 
-from sdnn.cli.common import (
-    NEW_FILE,
-    json_option,
-    json_text,
-    make_console,
-    run_command,
-    words_of_run,
-)
+from sdnn.cli import common
 from sdnn.cli.runs import run_argument, seed_option
 from sdnn.runs.errors import ConfigError
 
@@ -31,9 +24,9 @@ from sdnn.runs.errors import ConfigError
 @click.option("--best", is_flag=True, help="The agent that --keep-best kept, not the present one.")
 @seed_option
 @click.option(
-    "--out", metavar="FILE", type=NEW_FILE, help="The page, a .html file.  [default: in RUN]"
+    "--out", metavar="FILE", type=common.NEW_FILE, help="The page, a .html file.  [default: in RUN]"
 )
-@json_option
+@common.json_option
 def inspect(
     folder: Path, names: tuple[str, ...], best: bool, seed: int | None, out: Path | None,
     as_json: bool,
@@ -49,18 +42,18 @@ def inspect(
     path = out or folder / FILE_NAME
     if path.suffix != ".html":
         raise click.UsageError(f"--out must end in .html, got {path}")
-    in_files = words_of_run(folder)
+    in_files = common.words_of_run(folder)
 
     def message(error: ConfigError) -> str:
         return f"--input: {error.problem}" if error.key == "inputs" else in_files(error)
 
-    with run_command(message):
+    with common.run_command(message):
         inspection = inspect_run(Run.open(folder), names=names, seed=seed, best=best)
         write_inspection(inspection, path)
     if as_json:
-        click.echo(json_text({**inspection.to_json(), "page": str(path)}))
+        click.echo(common.json_text({**inspection.to_json(), "page": str(path)}))
         return
-    inspection.input_table().print(make_console(), full=False)
+    inspection.input_table().print(common.make_console(), full=False)
     for warning in inspection.warnings():
         click.echo(f"warning: {warning}")
     click.echo(f"wrote {path}")

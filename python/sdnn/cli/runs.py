@@ -8,23 +8,13 @@ from pathlib import Path
 
 import click
 
-from sdnn.cli.common import (
-    NEW_FILE,
-    SEED,
-    WARMING_UP,
-    json_option,
-    json_text,
-    option_words,
-    run_command,
-    train_run,
-    words_of_run,
-)
+from sdnn.cli import common
 
 RUN = click.Path(exists=True, file_okay=False, path_type=Path)
 run_argument = click.argument("folder", metavar="RUN", type=RUN)
 seed_option = click.option(
     "--seed",
-    type=SEED,
+    type=common.SEED,
     help="Root of the episodes' seeds.  [default: others than those of the training]",
 )
 
@@ -40,7 +30,7 @@ seed_option = click.option(
     help="Begin a new episode instead of repeating the present one: for robots, and for"
     " environments that do not repeat themselves.",
 )  # fmt: skip
-@json_option
+@common.json_option
 def resume(
     folder: Path, steps: int | None, episodes: int | None, new_episode: bool, as_json: bool
 ) -> None:
@@ -52,9 +42,11 @@ def resume(
     """
     from sdnn.runs.run import Run
 
-    with run_command(words_of_run(folder), folder=folder):
+    with common.run_command(common.words_of_run(folder), folder=folder):
         run = Run.open(folder)
-        train_run(run, as_json, steps=steps, episodes=episodes, repeat_episodes=not new_episode)
+        common.train_run(
+            run, as_json, steps=steps, episodes=episodes, repeat_episodes=not new_episode
+        )
 
 
 @click.command(short_help="Evaluate the agent of a run as it is now.")
@@ -68,14 +60,14 @@ def resume(
 )
 @click.option("--best", is_flag=True, help="The agent that --keep-best kept, not the present one.")
 @seed_option
-@json_option
+@common.json_option
 def evaluate(folder: Path, episodes: int, best: bool, seed: int | None, as_json: bool) -> None:
     """Evaluate the agent of RUN as it is now: greedy episodes in which nothing is learned."""
     import numpy as np
 
     from sdnn.runs.run import Run
 
-    with run_command(words_of_run(folder)):
+    with common.run_command(common.words_of_run(folder)):
         evaluation = Run.open(folder).evaluate(episodes, seed, best=best)
     returns = evaluation.returns
     low, median, high = np.percentile(returns, (25, 50, 75)).tolist()
@@ -92,7 +84,7 @@ def evaluate(folder: Path, episodes: int, best: bool, seed: int | None, as_json:
         "is_warming_up": evaluation.is_warming_up,
     }
     if as_json:
-        click.echo(json_text({**values, "returns": returns.tolist()}))
+        click.echo(common.json_text({**values, "returns": returns.tolist()}))
         return
     click.echo(
         f"{folder}: mean return {evaluation.mean_return:.6g} over {episodes} greedy episodes"
@@ -106,7 +98,7 @@ def evaluate(folder: Path, episodes: int, best: bool, seed: int | None, as_json:
         f" {values['share_terminated']:.0%} of the episodes terminated"
     )
     if evaluation.is_warming_up:
-        click.echo(WARMING_UP)
+        click.echo(common.WARMING_UP)
 
 
 @click.command(short_help="Draw the learning curves of runs.")
@@ -114,7 +106,7 @@ def evaluate(folder: Path, episodes: int, best: bool, seed: int | None, as_json:
 @click.option(
     "--out",
     metavar="FILE",
-    type=NEW_FILE,
+    type=common.NEW_FILE,
     help="A .png, .svg or .pdf file.  [default: curves.png in RUN, or here for several]",
 )
 @click.option(
@@ -146,7 +138,7 @@ def plot(
         _check_ending("--out", out, SUFFIXES)
     chosen = tuple(dict.fromkeys(folders))
     path = out or (chosen[0] / "curves.png" if len(chosen) == 1 else Path("curves.png"))
-    with run_command(option_words):
+    with common.run_command(common.option_words):
         runs = [Run.open(folder) for folder in chosen]
         curves, notes = curves_of(runs)
         levels, more_notes = levels_of(environments_of(runs), baselines, plain=plain)
@@ -158,7 +150,7 @@ def plot(
 
 @click.command(short_help="Record an episode of a run as .gif or .mp4.")
 @run_argument
-@click.argument("out", metavar="OUT", type=NEW_FILE)
+@click.argument("out", metavar="OUT", type=common.NEW_FILE)
 @seed_option
 @click.option(
     "--steps",
@@ -175,11 +167,11 @@ def record(folder: Path, out: Path, seed: int | None, steps: int | None) -> None
     from sdnn.runs.run import Run
 
     _check_ending("OUT", out, SUFFIXES)
-    with run_command(words_of_run(folder)):
+    with common.run_command(common.words_of_run(folder)):
         recording = record_run(Run.open(folder), out, seed=seed, max_steps=steps)
     click.echo(f"wrote {out}: {recording.n_frames} frames, return {recording.total_reward:.6g}")
     if recording.is_warming_up:
-        click.echo(WARMING_UP)
+        click.echo(common.WARMING_UP)
 
 
 def _check_ending(option: str, path: Path, endings: Sequence[str]) -> None:

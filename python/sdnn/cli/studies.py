@@ -12,13 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sdnn._core import presets
-from sdnn.cli.common import (
-    OLD_FILE,
-    SEED,
-    errors_in_a_line,
-    exit_interrupted,
-    make_console,
-)
+from sdnn.cli import common
 from sdnn.reproduction.cases import MOST_EPISODES, WORDS
 from sdnn.support.arguments import blamed
 
@@ -87,7 +81,7 @@ def study_command(make_study: Callable[..., Study]) -> Function:
         from sdnn.runs.engine import TrialBars
         from sdnn.runs.sweep import forecast, run_study
 
-        with errors_in_a_line():
+        with common.errors_in_a_line():
             try:
                 executor = _make_executor(where, jobs, scheduler, scheduler_timeout)
                 study = make_study(**options)
@@ -117,13 +111,13 @@ def study_command(make_study: Callable[..., Study]) -> Function:
             click.echo(f"Error: {failure.planned.title} ({variants}) failed: {message}", err=True)
         if outcome.interrupted:
             then = f"; {stored}; the same command continues from there"
-            exit_interrupted(then, outcome.signal or SIGINT)
+            common.exit_interrupted(then, outcome.signal or SIGINT)
         if done.page is None:
             click.echo(f"Error: nothing is complete, no figure drawn; {stored}", err=True)
         elif as_json:
             click.echo(json.dumps(done.table, indent=2))
         else:
-            done.page.print(make_console(), full=full)
+            done.page.print(common.make_console(), full=full)
             page = next(str(file) for file in done.files if file.suffix == ".html")
             summary = ""
             if outcome.n_planned:
@@ -160,13 +154,13 @@ def _make_executor(
 
 
 @click.command(short_help="Run a study: variants of any setting, trial by trial.")
-@click.argument("file", type=OLD_FILE)
+@click.argument("file", type=common.OLD_FILE)
 @click.option(
     "--trials",
     type=click.IntRange(1, 100_000),
     help="Trials per case and variant, instead of the file's.",
 )
-@click.option("--seed", type=SEED, help="Root of all seeds, instead of the file's.")
+@click.option("--seed", type=common.SEED, help="Root of all seeds, instead of the file's.")
 @click.option(
     "--only", metavar="VARIANT", multiple=True, help="Run this variant only; may be repeated."
 )
@@ -199,7 +193,7 @@ def sweep(file: Path, trials: int | None, seed: int | None, only: tuple[str, ...
     type=click.IntRange(1, MOST_EPISODES),
     help="Learning episodes per trial.  [default: 15000, as in the paper]",
 )
-@click.option("--seed", type=SEED, default=0, show_default=True, help="Root of all seeds.")
+@click.option("--seed", type=common.SEED, default=0, show_default=True, help="Root of all seeds.")
 @click.option(
     "--quick", is_flag=True, help="Run a fraction: 2 trials x 300 episodes; not the result."
 )

@@ -11,18 +11,7 @@ from typing import Any
 
 import click
 
-from sdnn.cli.common import (
-    KEYS,
-    OLD_FILE,
-    Options,
-    json_option,
-    named_values,
-    option_of,
-    option_words,
-    run_command,
-    train_run,
-    value_of,
-)
+from sdnn.cli import common
 from sdnn.runs.errors import ConfigError
 from sdnn.support.habits import advice
 
@@ -43,7 +32,7 @@ def _options() -> list[click.Option]:
     from sdnn.runs.spec import RunSpec
 
     options, schemas = [], schemas_of(RunSpec)
-    for key in KEYS:
+    for key in common.KEYS:
         schema: dict[str, Any] = {"$ref": "RunSpec"}
         for name in key.split("."):
             alternatives = (schema, *schema.get("anyOf", ()))  # `anyOf`: a table that may be null
@@ -54,7 +43,7 @@ def _options() -> list[click.Option]:
         is_flag, default = value_schema.get("type") == "boolean", schema.get("default")
         default_text = "" if default is None or is_flag else f"  [default: {default}]"
         option = click.Option(
-            [option_of(key), key.replace(".", "_")],
+            [common.option_of(key), key.replace(".", "_")],
             type=None if is_flag else _option_type(value_schema),
             is_flag=is_flag,
             default=None,
@@ -87,7 +76,7 @@ def _option_type(schema: Mapping[str, Any]) -> click.ParamType[Any]:
     "--config",
     "file",
     metavar="FILE",
-    type=OLD_FILE,
+    type=common.OLD_FILE,
     help="A specification in TOML, or another run's config.json; options override it.",
 )
 @click.option(
@@ -114,7 +103,7 @@ def _option_type(schema: Mapping[str, Any]) -> click.ParamType[Any]:
 )
 @click.option("--schema", is_flag=True, help="Print the JSON Schema of a specification, and exit.")
 @click.option("--dry-run", is_flag=True, help="Only check and print the specification.")
-@json_option
+@common.json_option
 def train(
     env_id: str | None,
     out: Path | None,
@@ -141,14 +130,14 @@ def train(
     from sdnn.runs.spec import RunSpec
 
     settings = _options_by_key(env_id, options)
-    with run_command(option_words):
+    with common.run_command(common.option_words):
         source = None if file is None else ConfigFile.read(file)
 
     def located_message(error: ConfigError) -> str:
         located = error if source is None else source.located(error, settings)
-        return str(located) if located.place else option_words(error)
+        return str(located) if located.place else common.option_words(error)
 
-    with run_command(located_message):
+    with common.run_command(located_message):
         values = {} if source is None else source.specification()
         spec = RunSpec.from_values(overridden(values, settings))
         environment = re.sub(r"[^\w.-]+", "-", spec.task)
@@ -157,15 +146,15 @@ def train(
             Run(folder, spec).check()
             click.echo(json.dumps({"folder": str(folder), **spec.values()}, indent=2))
             return
-    with run_command(located_message, folder=folder):
+    with common.run_command(located_message, folder=folder):
         if (folder / "config.json").exists():
             raise click.UsageError(
                 f"--out: {folder} holds a run already: {resume_command(folder)} continues it"
             )
-        train_run(Run.create(folder, spec), as_json)
+        common.train_run(Run.create(folder, spec), as_json)
 
 
-def _options_by_key(env_id: str | None, options: Options) -> Options:
+def _options_by_key(env_id: str | None, options: common.Options) -> common.Options:
     """Return the values of options by keys of a specification, and remove those of KEYS.
 
     UsageError for a key that two different options set. If an option is given twice, the last
@@ -173,9 +162,9 @@ def _options_by_key(env_id: str | None, options: Options) -> Options:
     """
     from sdnn.runs.settings import KEYS_BY_NAME
 
-    by_key = {key: options.pop(key.replace(".", "_")) for key in KEYS}
+    by_key = {key: options.pop(key.replace(".", "_")) for key in common.KEYS}
     values = {k: value for k, value in by_key.items() if value is not None and value is not False}
-    by_option = {key: (option_of(key), value) for key, value in values.items()}
+    by_option = {key: (common.option_of(key), value) for key, value in values.items()}
 
     def set_once(option: str, key: str, value: object) -> None:
         """Set `key` to the value of an option; refuse a key that another option has set."""
@@ -188,19 +177,19 @@ def _options_by_key(env_id: str | None, options: Options) -> Options:
 
     if env_id is not None:
         set_once("ENV_ID", "environment.id", env_id)
-    for name, text in named_values("--env-arg", options["kwargs"]):
-        set_once(f"--env-arg {name}", f"environment.kwargs.{name}", value_of(text))
+    for name, text in common.named_values("--env-arg", options["kwargs"]):
+        set_once(f"--env-arg {name}", f"environment.kwargs.{name}", common.value_of(text))
     for text in options["ranges"]:
         if text in ("adaptive", "running"):
             set_once("--range", "agent.observation_range", text)
         else:
             name, bounds = _named_range(text)
             set_once(f"--range {name}", f"environment.ranges.{name}", bounds)
-    for name, text in named_values("--set", options["settings"]):
+    for name, text in common.named_values("--set", options["settings"]):
         if "." not in name:
             example = advice(name, (), KEYS_BY_NAME) or "such as learning.discount"
             raise click.UsageError(f"--set {name}: must be TABLE.NAME; {example}")
-        set_once(f"--set {name}", name, value_of(text))
+        set_once(f"--set {name}", name, common.value_of(text))
     return values
 
 

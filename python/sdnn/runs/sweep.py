@@ -12,22 +12,10 @@ from sdnn import _core
 from sdnn.agents.registry import title_of
 from sdnn.reports.pages import Page, Section, Table
 from sdnn.reports.plots import NARROW_DPI, figure_bytes, png_bytes
+from sdnn.runs import report
 from sdnn.runs.engine import Executor, Observer, PlannedTrial, run_trials
 from sdnn.runs.errors import RunError
 from sdnn.runs.figures import draw_study
-from sdnn.runs.report import (
-    MEASURE_END,
-    PERCENT,
-    VERIFY_NOTE,
-    Content,
-    WrittenReport,
-    describe_call,
-    format_estimate,
-    measure_cells,
-    measures_section,
-    require_matplotlib,
-    settings_section,
-)
 from sdnn.runs.results import FINAL_WINDOW, MEASURES, SHARE_STABLE, MeasureName
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.study import MIN_TRIALS_TO_DIFFER, Comparison, Measured, Study, compare
@@ -38,9 +26,10 @@ from sdnn.support.machine import n_cores
 
 DIFFERENCE_NOTE = (
     "Differences are paired: a trial minus the reference's trial of the same number, which has the"
-    f" same seed; the mean over trials with its {PERCENT} bootstrap interval over trials, censored"
-    f" episodes as the last one. * marks intervals without 0 over at least {MIN_TRIALS_TO_DIFFER}"
-    " trials; where nothing differs, about one in twenty of them does so by chance."
+    f" same seed; the mean over trials with its {report.PERCENT} bootstrap interval over trials,"
+    " censored episodes as the last one. * marks intervals without 0 over at least"
+    f" {MIN_TRIALS_TO_DIFFER} trials; where nothing differs, about one in twenty of them does so by"
+    " chance."
 )
 SOLVED_NOTE = (
     "end solved: trials that solve at least"
@@ -50,7 +39,7 @@ SOLVED_NOTE = (
 
 def run_study(
     study: Study, out: Path, *, executor: Executor | None = None, observer: Observer | None = None
-) -> WrittenReport:
+) -> report.WrittenReport:
     """Run the missing trials of a study, then write the report of its complete parts.
 
     A variant in a case is complete when all its trials are stored, also by earlier calls. If a
@@ -61,7 +50,7 @@ def run_study(
     the result file cannot be used; later if the cluster cannot run trials any more: what was
     finished is stored. ``executor`` and ``observer``: see `sdnn.runs.engine.run_trials`.
     """
-    require_matplotlib()
+    report.require_matplotlib()
     begin = time.monotonic()
     is_new = not (out / STORE_NAME).exists()
     if is_new:
@@ -72,13 +61,13 @@ def run_study(
         remove_abandoned_files(out)
         outcome = run_trials(study.plan(), store, executor=executor, observer=observer)
         if outcome.interrupted:
-            return WrittenReport(outcome)
+            return report.WrittenReport(outcome)
         study.measure(store, observer or (lambda _: None))
         keys = {key for pair in study.combinations for key in study.keys(*pair)}
         content = study.report(compare(study, store.load(keys)), store)
     if content is None:
-        return WrittenReport(outcome)
-    call = describe_call(outcome, time.monotonic() - begin, content.shown)
+        return report.WrittenReport(outcome)
+    call = report.describe_call(outcome, time.monotonic() - begin, content.shown)
     data_by_name = dict(content.files) | {
         "results.md": content.page.to_markdown().encode(),
         "table.json": (json.dumps(content.table, indent=2, allow_nan=False) + "\n").encode(),
@@ -87,7 +76,7 @@ def run_study(
     files = {out / study.file_name(name): data for name, data in data_by_name.items()}
     for path, data in files.items():
         write_whole(path, data)
-    return WrittenReport(outcome, content.page, tuple(files), content.table)
+    return report.WrittenReport(outcome, content.page, tuple(files), content.table)
 
 
 PROBE_SECONDS = 0.3  # approximate processor time of a probe
@@ -180,7 +169,7 @@ Addition: TypeAlias = tuple[Sequence[Section], Mapping[str, object]]
 """Additions to a report, such as verdicts: sections of the page, and values of the JSON."""
 
 
-def study_content(comparison: Comparison, addition: Addition) -> Content | None:
+def study_content(comparison: Comparison, addition: Addition) -> report.Content | None:
     """Make the report of the complete parts of a study that was read from a file."""
     if not comparison.measured:
         return None
@@ -194,7 +183,7 @@ def study_content(comparison: Comparison, addition: Addition) -> Content | None:
         for (_, variant), measured in comparison.measured.items()
         for row in trial_rows(measured.result.records)
     )
-    return Content(
+    return report.Content(
         page=study_page(comparison, digest, addition, svg, narrow),
         table=study_json(comparison, digest, addition),
         files={
@@ -237,10 +226,10 @@ def study_page(
             *_case_sections(comparison),
             _measures_section(comparison),
             Section(title="The study", folded=[file]),
-            settings_section(titles),
+            report.settings_section(titles),
         ],
         source=f"Study {study.source}; root seed {study.seed}; digest of the rows"
-        f" {digest[:16]}; sdnn {_core.__version__}. {VERIFY_NOTE}",
+        f" {digest[:16]}; sdnn {_core.__version__}. {report.VERIFY_NOTE}",
     )
 
 
@@ -256,10 +245,10 @@ def _case_sections(comparison: Comparison) -> Iterator[Section]:
         end = ("end solved",) if any(m.solved_at_end is not None for m in measured) else ()
         rows = [
             (m.variant.title, title_of(m.result.agent), str(m.result.n_trials),
-             *((m.end_solved,) if end else ()), *measure_cells(m.result, names))
+             *((m.end_solved,) if end else ()), *report.measure_cells(m.result, names))
             for m in measured
         ]  # fmt: skip
-        header = ("variant", "agent", "trials", *end, *measures, *MEASURE_END)
+        header = ("variant", "agent", "trials", *end, *measures, *report.MEASURE_END)
         brief = ("variant", *end, *(word for word in measures if word not in ONLY_IN_FULL))
         yield Section(table=Table(case.title, header, rows, brief=brief))
         title = f"{case.title}: minus {comparison.study.reference}, trial by trial"
@@ -271,7 +260,7 @@ def _case_sections(comparison: Comparison) -> Iterator[Section]:
 
 def _difference(measured: Measured, name: MeasureName) -> str:
     """Write the mean difference from the reference; an asterisk marks what differs from it."""
-    text = format_estimate(measured.differences.get(name), name, sign="+")
+    text = report.format_estimate(measured.differences.get(name), name, sign="+")
     return text + (" *" if measured.differs(name) else "")
 
 
@@ -283,7 +272,7 @@ def _measures_section(comparison: Comparison) -> Section:
     notes += [DIFFERENCE_NOTE] if any(m.differences for m in measured) else []
     notes += [SOLVED_NOTE] if any(m.solved_at_end is not None for m in measured) else []
     names = {name for m in measured for name in m.result.values}
-    return measures_section((name for name in MEASURES if name in names), notes)
+    return report.measures_section((name for name in MEASURES if name in names), notes)
 
 
 def study_json(comparison: Comparison, digest: str, addition: Addition) -> dict[str, object]:
