@@ -71,10 +71,9 @@ def reader_of(dataset: Any) -> Callable[[], Iterator[Logged]]:
     """
     if isinstance(dataset, str | Path):
         path = path_of("dataset", dataset)
-        is_table = path.suffix.lower() == ".csv"
-        return lambda: (
-            _with_next_observations(_table_lines(path)) if is_table else _json_lines(path)
-        )
+        if path.suffix.lower() == ".csv":
+            return lambda: _with_next_observations(_table_lines(path))
+        return lambda: _json_lines(path)
     if hasattr(dataset, "columns") and hasattr(dataset, "iloc"):  # a table of pandas
         dataset = {str(name): dataset[name].to_numpy() for name in dataset.columns}
     if isinstance(dataset, Mapping):

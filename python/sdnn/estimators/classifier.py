@@ -131,9 +131,8 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
             """Return the cross entropy of the smoothed targets, for a search over the steepness."""
             logarithms = log_softmax(np.exp(log_steepness) * scores, axis=1)
             of_targets = logarithms[np.arange(len(targets)), targets]
-            return weighted_mean(
-                -(1 - share) * of_targets - share * logarithms.mean(axis=1), weights
-            )
+            losses = -(1 - share) * of_targets - share * logarithms.mean(axis=1)
+            return weighted_mean(losses, weights)
 
         best = minimize_scalar(loss, bounds=np.log(STEEPNESSES), method="bounded").x
         return float(np.clip(np.exp(best), *STEEPNESSES))
@@ -235,9 +234,8 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
 
     def _check_outputs(self, y: Array, classes: ArrayLike | None) -> None:
         """Raise ValueError for classes other than those of the first call."""
-        if classes is not None and not np.array_equal(
-            unique_labels(classes), np.sort(self.classes_)
-        ):
+        known = np.sort(self.classes_)
+        if classes is not None and not np.array_equal(unique_labels(classes), known):
             raise ValueError(
                 f"classes={classes!r} are not those of the first call, {self.classes_!r}"
             )

@@ -213,9 +213,8 @@ class Network:
         The other layer is faster for many samples, but may have to copy new weights first.
         """
         must_copy = self._synchronized is not self._learned
-        return self._online is not None and n_samples <= (
-            FEW_SAMPLES if must_copy else FEW_TO_PREDICT
-        )
+        most_samples = FEW_SAMPLES if must_copy else FEW_TO_PREDICT
+        return self._online is not None and n_samples <= most_samples
 
     def learn_online(self, bins: Ints, rule: Rule, memory_limit: int) -> bool:
         """Learn samples in place, in order; return False without a layer for single samples.

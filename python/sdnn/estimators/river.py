@@ -90,7 +90,9 @@ class RiverRegressor(StreamEstimator, base.Regressor):
             return 0.0
         with np.errstate(over="ignore", invalid="ignore"):
             mean = float(np.mean(self.targets))
-        return mean if math.isfinite(mean) else sum(y / len(self.targets) for y in self.targets)
+        if math.isfinite(mean):
+            return mean
+        return float(sum(y / len(self.targets) for y in self.targets))  # their sum may overflow
 
     def learn_one(self, x: Features, y: Target) -> None:
         """Learn one sample; an error changes nothing."""

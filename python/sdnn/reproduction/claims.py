@@ -264,9 +264,8 @@ def _judge_check(
             return CheckOutcome(check, None, Verdict.NOT_RUN)
         estimate = estimate_contrast(times[check.n_inputs], times[check.n_fewer], np.divide)
         is_full = all(cost.config_hash == CostConfig().config_hash for cost in costs)
-        return CheckOutcome(
-            check, estimate, verdict_of(check, estimate) if is_full else Verdict.NOT_JUDGED
-        )
+        verdict = verdict_of(check, estimate) if is_full else Verdict.NOT_JUDGED
+        return CheckOutcome(check, estimate, verdict)
     if not measured.keys() >= set(check.subjects):
         return CheckOutcome(check, None, Verdict.NOT_RUN)
     results = [measured[subject] for subject in check.subjects]

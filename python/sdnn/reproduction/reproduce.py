@@ -97,18 +97,11 @@ class PaperStudy(Study):
         has_sensors = sensors is not None or noise is not None
         if has_sensors:
             experiments = _experiment_with_sensors(word, sensors, noise)
-        self.experiments = [
-            experiment.with_agents(self.agents, presets) for experiment in experiments
-        ]
+        self.experiments = [e.with_agents(self.agents, presets) for e in experiments]
         cases = [case for experiment in self.experiments for case in experiment.cases]
         whole("episodes", episodes, PAPER_INTERVAL, MOST_EPISODES)
         super().__init__("", specs_of(cases, episodes), n_trials=trials, seed=seed)
-        requested_pairs = {
-            pair
-            for experiment in self.experiments
-            if experiment.id in requested
-            for pair in experiment.pairs
-        }
+        requested_pairs = {pair for e in self.experiments if e.id in requested for pair in e.pairs}
         self.pairs = tuple(pair for pair in self.combinations if pair in requested_pairs)
         self.cost_config = cost.QUICK_COST if quick else CostConfig()
         self.costs = {}
@@ -129,7 +122,7 @@ class PaperStudy(Study):
             *([f"{episodes}-episodes"] if episodes != defaults[1] else []),
             *([f"seed-{seed}"] if seed else []),
             *(["quick"] if quick else []),
-        ]
+        ]  # of what is not the default, in the names of files
 
     def measure(self, store: ResultStore, observe: Observer) -> None:
         """Measure the costs that are not stored."""
@@ -168,25 +161,19 @@ class PaperStudy(Study):
             agents=tuple(self.agents),
             reference=more_trials(result for _, results in collected for result in results),
         )
-        drawn = {
-            f"experiment-{experiment.id}": draw_experiment(experiment, results, quick=self.quick)
-            for experiment, results in collected
-        }
+        drawn, narrow, quick = {}, {}, self.quick
+        for experiment, results in collected:
+            name = f"experiment-{experiment.id}"
+            drawn[name] = draw_experiment(experiment, results, quick=quick)
+            narrow[name] = draw_experiment(experiment, results, quick=quick, narrow=True)
         files: dict[str, bytes] = {}
         if report.costs:
-            drawn["cost"] = draw_cost(report.costs, quick=self.quick)
+            drawn["cost"] = draw_cost(report.costs, quick=quick)
+            narrow["cost"] = draw_cost(report.costs, quick=quick, narrow=True)
             files["cost.csv"] = csv_bytes(cost.COST_ROW_HEADER, cost.round_rows(report.costs))
         for name, figure in drawn.items():
             files[f"{name}.png"], files[f"{name}.svg"] = figure_bytes(figure)
         files["results.csv"] = csv_bytes(ROW_HEADER, trial_rows(report.records))
-        narrow = {
-            f"experiment-{experiment.id}": draw_experiment(
-                experiment, results, quick=self.quick, narrow=True
-            )
-            for experiment, results in collected
-        }
-        if report.costs:
-            narrow["cost"] = draw_cost(report.costs, quick=self.quick, narrow=True)
         page = report.page(
             {name: files[f"{name}.svg"] for name in drawn},
             {name: png_bytes(figure, NARROW_DPI) for name, figure in narrow.items()},

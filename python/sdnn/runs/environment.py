@@ -113,9 +113,8 @@ class EnvironmentSpec(Settings, frozen=True):
         if self.is_paper_acrobot:
             kwargs = dict(self.kwargs)
             for name, default in _PAPER_DEFAULTS._asdict().items():
-                kwargs[name] = values_of(
-                    with_changes(default, kwargs.get(name, {}), f"kwargs.{name}")
-                )
+                settings = with_changes(default, kwargs.get(name, {}), f"kwargs.{name}")
+                kwargs[name] = values_of(settings)
             msgspec.structs.force_setattr(self, "kwargs", kwargs)
         try:
             json.dumps(self.kwargs, allow_nan=False)

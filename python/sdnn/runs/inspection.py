@@ -185,9 +185,8 @@ class Inspection:
         """Return how states use the range of an input; None for angles, symbols and unused ones."""
         if not agent_input.is_used or agent_input.type != "variable":
             return None
-        low, high = (
-            float(bounds[agent_input.columns[0]]) for bounds in self.agent.observation_range
-        )
+        column = agent_input.columns[0]
+        low, high = (float(bounds[column]) for bounds in self.agent.observation_range)
         numbers = agent_input.numbers(self.states)
         # Percentiles 5 and 95 enclose nine tenths, so that rare extremes do not count as use.
         first, last = np.clip(np.percentile(numbers, (5, 95)), low, high).tolist()

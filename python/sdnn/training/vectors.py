@@ -76,7 +76,7 @@ class _SyncEnvironments(EnvironmentAdapter):
             if type(observation) is not ndarray or observation.dtype is not dtype:
                 break
         else:
-            return observations  # nothing is to be converted
+            return observations  # all have the type already
         if any(has_mask(space, observation) for observation in observations):
             return observations  # the vector's arrays would drop the mask of a masked array
         batch: Any = create_empty_array(space, len(observations))
