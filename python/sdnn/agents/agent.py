@@ -270,6 +270,7 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
         ), None
 
     def _masked_action(self, observation: Element, explore: bool, mask: Mask) -> Element:
+        """Choose an action as `act` does; errors about the mask name the argument of `predict`."""
         try:
             return self.act(observation, explore, mask=mask)
         except ValueError as error:

@@ -225,6 +225,7 @@ class Anchored(Coding):
     is_circular: ClassVar[bool]
 
     def _check_anchors(self) -> None:
+        """Check the numbers of patterns, and that of bins, which follows from them."""
         whole("n_anchor_patterns", self.n_anchor_patterns, 2, 10000)
         whole("n_interpolated", self.n_interpolated, 0, 10000)
         whole("(n_anchor_patterns - 1) * (n_interpolated + 1)", self.size, 1, MAX_BINS)

@@ -155,6 +155,7 @@ class CorrelationMatrix(Categorical):
     categories: tuple[Category, ...] | None = None
 
     def __post_init__(self) -> None:
+        """Convert the matrix to tuples of its rows, so that equal codings have equal hashes."""
         super().__post_init__()
         rows = np.atleast_2d(array_of("matrix", self.matrix).astype(np.float64))
         object.__setattr__(self, "matrix", tuple(map(tuple, rows.tolist())))

@@ -109,6 +109,7 @@ class EnvironmentSpec(Settings, frozen=True):
     ] = False
 
     def __post_init__(self) -> None:
+        """Fill in the arguments of the paper's acrobot, and check ranges."""
         super().__post_init__()
         if self.is_paper_acrobot:
             kwargs = dict(self.kwargs)

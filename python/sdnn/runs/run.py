@@ -220,12 +220,12 @@ class Run(Displayed):
                 raise KeyboardInterrupt
             agent, env = training.agent, training.env
             agent.save(self.folder / AGENT)
-        evaluations = [row for row in self.rows() if row["kind"] == "evaluation"]
+        evaluations = (row for row in reversed(self.rows()) if row["kind"] == "evaluation")
+        last = next(evaluations, None)
         has_report = isinstance(agent, ValueAgent) and not agent.is_warming_up
         single = env.envs[0] if isinstance(env, gym.vector.SyncVectorEnv) else env
         assert isinstance(single, gym.Env)
         threshold = single.spec.reward_threshold if single.spec else None
-        last = evaluations[-1] if evaluations else None
         return RunOutcome(
             n_steps=training.n_steps,
             n_episodes=training.n_episodes,

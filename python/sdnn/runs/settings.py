@@ -76,6 +76,7 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """
 
     def __post_init__(self) -> None:
+        """Check the value of each field, and convert it to the field's type."""
         for name, field_type in _types_of_fields(type(self)).items():
             value = getattr(self, name)
             converted = convert_value(field_type, value, name)

@@ -87,6 +87,7 @@ class RunSpec(Settings, frozen=True):
     output: Annotated[OutputSpec, doc("What is written besides the rows.")] = OutputSpec()
 
     def __post_init__(self) -> None:
+        """Replace shorthands by tables, check all values, and fill in those that are missing."""
         for name, key in SHORTHANDS.items():
             if isinstance(value := getattr(self, name), str):
                 self._set(**{name: {key: value}})
@@ -97,6 +98,7 @@ class RunSpec(Settings, frozen=True):
         self._fill_protocol()
 
     def _set(self, **values: object) -> None:
+        """Set fields of this frozen object while it is made."""
         for name, value in values.items():
             msgspec.structs.force_setattr(self, name, value)
 
