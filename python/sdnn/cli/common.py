@@ -192,7 +192,6 @@ def train_run(
     repeat_episodes: bool = True,
 ) -> None:  # fmt: skip
     """Train a run with a bar on terminals; print the result, in words or as JSON (`as_json`)."""
-    from sdnn.reports.pages import rendered
     from sdnn.runs.run import resume_command
     from sdnn.training.training import shows_bar
 
@@ -216,7 +215,6 @@ def train_run(
         within = [i for i, s in shares if s and s < 0.1 and i not in report["fitted"]]
         beyond = [i for i, s in enumerate(report["share_beyond_range"]) if s and s > 0.1]
     text = rendered(
-        "sdnn.cli",
         "outcome.txt.jinja",
         run=run,
         outcome=outcome,
@@ -228,7 +226,20 @@ def train_run(
         folder=str(run.folder),
         quoted=shlex.quote(str(run.folder)),
     )
-    click.echo(text.rstrip("\n"))
+    click.echo(text)
+
+
+def rendered(template: str, **values: object) -> str:
+    """Fill in a template of this package; without a line feed at the end."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("sdnn.cli", "."),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template(template).render(values).rstrip("\n")
 
 
 def json_text(values: object) -> str:

@@ -77,7 +77,7 @@ def study_command(make_study: Callable[..., Study]) -> Function:
         """Run the study that the options describe, print its results, and exit with a status."""
         from rich.console import Console
 
-        from sdnn.reports.pages import duration_words, rendered
+        from sdnn.reports.pages import duration_words
         from sdnn.runs.engine import TrialBars
         from sdnn.runs.sweep import forecast, run_study
 
@@ -96,7 +96,7 @@ def study_command(make_study: Callable[..., Study]) -> Function:
                 text = json.dumps(estimate, indent=2)
                 if not as_json:
                     values = {"out": out, "duration": duration_words, **estimate}
-                    text = rendered("sdnn.cli", "forecast.txt.jinja", **values).rstrip("\n")
+                    text = common.rendered("forecast.txt.jinja", **values)
                 click.echo(text, nl=bool(text))
                 return
             with TrialBars(Console(stderr=True)) as observer:

@@ -15,9 +15,9 @@ from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 
+import sdnn.estimators.ridge as ridge
 from sdnn.coding import RandomInverse
 from sdnn.coding.kernel import N_UNITS, AnalyticKernel
-from sdnn.estimators import ridge
 from sdnn.estimators.columns import Array, Floats, PairChoice, input_pairs
 from sdnn.estimators.input_choice import Inputs, all_inputs, inputs_to_compare, squared_losses
 from sdnn.estimators.inputs import CodedClassifier, CodedInputs, CodedRegressor

@@ -120,19 +120,19 @@ class Page:
 
     def to_markdown(self) -> str:
         """Return the page in Markdown, without figures."""
-        return rendered("sdnn.reports", "page.md.jinja", page=self)
+        return _rendered("page.md.jinja", page=self)
 
     def to_html(self, call: str) -> str:
         """Return the page as self-contained HTML; `call` is the command that made it."""
-        return rendered("sdnn.reports", "page.html.jinja", page=self, call=call)
+        return _rendered("page.html.jinja", page=self, call=call)
 
 
-def rendered(package: str, template: str, **values: object) -> str:
-    """Fill in a template of a package of this library; HTML is escaped."""
+def _rendered(template: str, **values: object) -> str:
+    """Fill in a template of this package; HTML is escaped."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
-        loader=PackageLoader(package, "."), autoescape=".html." in template,
+        loader=PackageLoader("sdnn.reports", "."), autoescape=".html." in template,
         undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
     )  # fmt: skip
     environment.filters["markdown"] = markdown_text

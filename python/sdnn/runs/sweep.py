@@ -8,11 +8,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TypeAlias
 
+import sdnn.runs.report as report
 from sdnn import _core
 from sdnn.agents.registry import title_of
 from sdnn.reports.pages import Page, Section, Table
 from sdnn.reports.plots import NARROW_DPI, figure_bytes, png_bytes
-from sdnn.runs import report
 from sdnn.runs.engine import Executor, Observer, PlannedTrial, run_trials
 from sdnn.runs.errors import RunError
 from sdnn.runs.figures import draw_study

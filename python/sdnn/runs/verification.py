@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+import sdnn.runs.engine as engine
 from sdnn._core import __version__
-from sdnn.runs import engine
 from sdnn.runs.errors import ConfigError, RunError
 from sdnn.runs.reported import Consent, ReportedTrial, Reports
 from sdnn.runs.run import Goal
