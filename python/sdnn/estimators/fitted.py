@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from inspect import get_annotations
 from pathlib import Path
 from typing import Any, Self
 
@@ -51,10 +50,27 @@ class Learned(BaseEstimator):
 
 
 ATTRIBUTES: dict[str, type] = {
-    name: hint if isinstance(hint, type) else np.ndarray
-    for name, hint in get_annotations(Learned, eval_str=True).items()
+    "n_corrected_": np.ndarray,
+    "n_features_in_": int,
+    "n_inputs_out_of_range_": int,
+    "n_iter_": int,
+    "n_outputs_": int,
+    "n_outputs_out_of_range_": int,
+    "output_range_": np.ndarray,
+    "training_form_": str,
+    "training_memory_": int,
+    "validation_scores_": np.ndarray,
+    "_counts_of_range": int,
+    "_flat": bool,
+    "_n_units_each": int,
+    "_n_weighted": int,
+    "_scheme": str,
+    "_weight_seed": int,
+    "held_out_counts_": np.ndarray,
+    "held_out_residuals_": np.ndarray,
+    "steepness_": float,
 }
-"""Types of the attributes of `Learned` as a file has them."""
+"""Types of the attributes of `Learned` as a file has them; NumPy's names in annotations change."""
 
 
 class Fitted(Learned):
