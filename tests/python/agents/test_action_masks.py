@@ -26,14 +26,14 @@ SPACES = {"discrete": gym.spaces.Discrete(5, start=-1), "several": gym.spaces.Mu
 
 
 class Masked(gym.Env):
-    """A walk in which a random half of the actions is allowed; others fail an assertion."""
+    """Random states, in each of which a random half of the actions is allowed, by an assertion."""
 
     def __init__(self, actions="discrete", unbounded=False):
         bound = np.inf if unbounded else 1.0
         self.observation_space = gym.spaces.Box(-bound, bound, (2,), np.float64)
         self.action_space = SPACES[actions]
 
-    def numbers_of_actions(self):
+    def n_actions_of_dimensions(self):
         if isinstance(self.action_space, gym.spaces.Discrete):
             return [int(self.action_space.n)]
         return self.action_space.nvec.tolist()
@@ -42,10 +42,10 @@ class Masked(gym.Env):
         masks = tuple(mask.copy() for mask in self.allowed)
         return masks if len(masks) > 1 else masks[0]
 
-    def begin_state(self):
+    def draw_state_and_mask(self):
         self.state = self.np_random.uniform(-1, 1, 2)
         self.allowed = [
-            self.np_random.integers(0, 2, n).astype(np.int8) for n in self.numbers_of_actions()
+            self.np_random.integers(0, 2, n).astype(np.int8) for n in self.n_actions_of_dimensions()
         ]
         for mask in self.allowed:
             mask[self.np_random.integers(len(mask))] = 1
@@ -53,17 +53,17 @@ class Masked(gym.Env):
 
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
-        self.n = 0
-        return self.begin_state(), {}
+        self.n_steps = 0
+        return self.draw_state_and_mask(), {}
 
     def step(self, action):
         indices = np.ravel(action) - np.ravel(getattr(self.action_space, "start", 0))
         for index, mask in zip(indices, self.allowed, strict=True):
             assert mask[index] == 1, (indices, self.allowed)
-        self.n += 1
+        self.n_steps += 1
         reward = float(self.state[0] * indices[0])
-        terminated, truncated = self.n % 7 == 6, self.n == 11
-        return self.begin_state(), reward, terminated, truncated, {}
+        terminated, truncated = bool(self.np_random.random() < 0.1), self.n_steps == 11
+        return self.draw_state_and_mask(), reward, terminated, truncated, {}
 
 
 def new_env(actions="discrete", unbounded=False):
@@ -91,10 +91,11 @@ def test_only_allowed_actions_are_taken(agent_class, actions, unbounded):
 
 @pytest.mark.parametrize("mode", ["NEXT_STEP", "SAME_STEP", "DISABLED"])
 @pytest.mark.parametrize("actions", SPACES)
-def test_masked_vectors_of_every_autoreset_mode_learn_the_same(actions, mode):
-    def trained(n, mode):
+def test_masked_vectors_learn_alike_in_all_modes_and_one_environment_as_a_single_one(actions, mode):
+    def trained(n_environments, mode):
         envs = gym.vector.SyncVectorEnv(
-            [lambda: new_env(actions)] * n, autoreset_mode=gym.vector.AutoresetMode[mode]
+            [lambda: new_env(actions)] * n_environments,
+            autoreset_mode=gym.vector.AutoresetMode[mode],
         )
         agent = new_agent(SDNNQLambda, envs)
         agent.train(envs, steps=200)
@@ -107,7 +108,7 @@ def test_masked_vectors_of_every_autoreset_mode_learn_the_same(actions, mode):
 
 
 @pytest.mark.parametrize("mode", ["NEXT_STEP", "SAME_STEP"])
-def test_masked_vectors_without_separate_resets_take_allowed_actions(mode, monkeypatch):
+def test_masked_vectors_that_reset_themselves_take_allowed_actions(mode, monkeypatch):
     monkeypatch.setattr("sdnn.training.vectors._resets_each", lambda env: False)
     env = gym.vector.SyncVectorEnv([new_env] * 3, autoreset_mode=gym.vector.AutoresetMode[mode])
     agent = new_agent(SDNNQLambda, env)
@@ -123,7 +124,7 @@ def test_a_mask_that_allows_every_action_changes_nothing(agent_class):
         x, next_x = random.uniform(-1, 1, (2, 2))
         action = agent.act(x)
         assert masked.act(x, mask=np.ones(5, bool)) == action
-        assert masked.act(x, False, mask=[1] * 5) == agent.act(x, False)
+        assert masked.act(x, explore=False, mask=[1] * 5) == agent.act(x, explore=False)
         agent.learn(Transition(x, action, 1.0, next_x, False))
         masked.learn(Transition(x, action, 1.0, next_x, False, np.ones(5, np.int8)))
     for x in random.uniform(-1, 1, (10, 2)):
@@ -145,34 +146,35 @@ def test_targets_bootstrap_from_allowed_actions_only(agent_class):
     high, low = agent.q_values(next_x)[[1, 2]]  # actions 0 and 1; the first one is -1
     assert high > low > 0.5
 
-    def learned(mask):
-        masked = type(agent).rebuild(agent.description(), agent.state())
+    def value_and_next_values_after_learning(mask):
+        copy = type(agent).rebuild(agent.description(), agent.state())
         for _ in range(30):
-            masked.learn(Transition(x, 0, 0.0, next_x, False, mask))
-            masked.begin_episode()
-        return masked.q_values(x)[1], masked.q_values(next_x)
+            copy.learn(Transition(x, 0, 0.0, next_x, False, mask))
+            copy.begin_episode()
+        return copy.q_values(x)[1], copy.q_values(next_x)
 
     # SDNN-C with few units has coarse values.
     tolerance = 1.2 if agent_class is SDNNQLearning else 0.05
     # With a reward of 0, the target is the discount 0.5 times the best allowed next value.
-    value, next_values = learned(None)
+    value, next_values = value_and_next_values_after_learning(None)
     assert value == pytest.approx(0.5 * next_values.max(), abs=tolerance)
-    value, next_values = learned([0, 0, 1, 0, 0])
+    value, next_values = value_and_next_values_after_learning([0, 0, 1, 0, 0])
     assert value == pytest.approx(0.5 * next_values[2], abs=tolerance)
 
 
 @pytest.mark.parametrize("unbounded", [False, True], ids=["bounds", "warm-up"])
 @pytest.mark.parametrize("actions", SPACES)
 @pytest.mark.parametrize("agent_class", AGENTS)
-@pytest.mark.parametrize(("stop", "n_envs"), [(33, None), (100, None), (20, 3)])
+@pytest.mark.parametrize(("stop_step", "n_envs"), [(33, 1), (100, 1), (20, 3)])
 def test_a_training_with_masks_resumes_exactly(
-    agent_class, actions, unbounded, stop, n_envs, tmp_path
+    agent_class, actions, unbounded, stop_step, n_envs, tmp_path
 ):
-    more = {"n_steps": 3} if agent_class is SDNNQLearning else {"bootstrap": "sarsa"}
-    learning = agent_class.learning_type(**more)
+    # Masks of several earlier steps, or of the next one, are part of the state.
+    settings = {"n_steps": 3} if agent_class is SDNNQLearning else {"bootstrap": "sarsa"}
+    learning = agent_class.learning_type(**settings)
 
     def masked_env():
-        if n_envs is None:
+        if n_envs == 1:
             return new_env(actions, unbounded)
         return gym.vector.SyncVectorEnv([lambda: new_env(actions, unbounded)] * n_envs)
 
@@ -181,17 +183,16 @@ def test_a_training_with_masks_resumes_exactly(
         agent = new_agent(agent_class, env, learning=learning)
         return Training(agent, env, steps=150, callbacks=callbacks)
 
-    check_exact_resume(new_training, masked_env, tmp_path / "part", [stop])
+    check_exact_resume(new_training, masked_env, tmp_path / "training", [stop_step])
 
 
-def test_masks_in_a_log_file_are_learned(tmp_path):
+def test_masks_in_a_log_file_are_learned_like_those_of_transitions(tmp_path):
     agents = [new_agent(SDNNQLambda, Masked()) for _ in range(2)]
-    steps = [Transition([0.1, 0.2], 1, 1.0, [0.3, 0.4], False, [1, 0, 0, 1, 0])] * 3
-    learn_from(agents[0], steps)
-    with (tmp_path / "log.jsonl").open("w") as file:
-        for step in steps:
-            file.write(json.dumps(step._asdict()) + "\n")
-    learn_from(agents[1], tmp_path / "log.jsonl")
+    transition = Transition([0.1, 0.2], 1, 1.0, [0.3, 0.4], False, [1, 0, 0, 1, 0])
+    learn_from(agents[0], [transition] * 3)
+    path = tmp_path / "log.jsonl"
+    path.write_text((json.dumps(transition._asdict()) + "\n") * 3)
+    learn_from(agents[1], path)
     assert states_equal(*agents)
 
 
@@ -201,10 +202,11 @@ BAD_MASKS = {
     ],
     "several": [([1, 0, 0, 0], [0, 0, 1]), [[1, 0, 0]], ([1, 0, 0], 1), [1] * 6],
 }  # fmt: skip
+"""Five actions need five flags, two dimensions three and four, some of which are set."""
 
 
 @pytest.mark.parametrize("actions", SPACES)
-def test_masks_of_wrong_size_or_type_are_refused(actions):
+def test_invalid_masks_are_refused_and_change_nothing(actions):
     agent, untouched = (new_agent(SDNNQLambda, Masked(actions)) for _ in range(2))
     action = untouched.act([0.0, 0.0], explore=False)
     for mask in BAD_MASKS[actions]:
@@ -216,15 +218,11 @@ def test_masks_of_wrong_size_or_type_are_refused(actions):
     assert states_equal(agent, untouched)
 
 
-def test_a_mask_of_several_dimensions_may_be_parts_or_a_flat_array():
+def test_a_mask_of_two_dimensions_may_be_two_lists_or_a_flat_array():
     agent = new_agent(SDNNQLambda, Masked("several"))
     parts = [0, 1, 0], [0, 0, 0, 1]
-    for mask in (
-        parts,
-        list(parts),
-        [*parts[0], *parts[1]],
-        np.array([*parts[0], *parts[1]], float),
-    ):
+    flat = [*parts[0], *parts[1]]
+    for mask in (parts, list(parts), flat, np.array(flat, float)):
         np.testing.assert_array_equal(agent.act([0.0, 0.0], mask=mask), [1, 3])
         np.testing.assert_array_equal(agent.predict([0.0, 0.0], action_masks=mask)[0], [1, 3])
     masks = [parts, ([1, 0, 0], [1, 0, 0, 0])]
@@ -250,20 +248,15 @@ def test_the_wrapper_action_masks_refuses_continuous_actions_and_uncallable_mask
 
 
 class Forgetful(gym.Wrapper):
-    """Loses the mask in some steps."""
-
-    def __init__(self, env):
-        super().__init__(env)
-        self.n = 0
+    """Returns no mask in the fourth step of an episode."""
 
     def step(self, action):
         *results, info = self.env.step(action)
-        self.n += 1
-        return (*results, {} if self.n % 5 == 4 else info)
+        return (*results, {} if self.unwrapped.n_steps == 4 else info)
 
 
 def test_missing_or_misshapen_masks_of_environments_are_unusable_steps():
-    env = ActionMasks(gym.make("CartPole-v1"))  # has none
+    env = ActionMasks(gym.make("CartPole-v1"))  # CartPole has no masks
     agent = SDNNQLambda(env.observation_space, env.action_space)
     with pytest.raises(UnusableStepError, match="action_mask"):
         agent.train(env, steps=3)

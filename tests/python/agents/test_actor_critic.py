@@ -3,7 +3,7 @@
 import gymnasium as gym
 import numpy as np
 import pytest
-import sdnn_actor_critic as page
+import sdnn_actor_critic as transcription
 from hypothesis import given, settings, strategies as st
 
 from q_lambda_transcription import SMALL, VariableDiscount, random_durations, random_transitions
@@ -13,11 +13,11 @@ from sdnn.agents import ActorCriticConfig, SDNNActorCritic, SDNNQLambda, Transit
 from sdnn.approximators import LinearSDNNConfig
 from sdnn.export import c_header
 
-STILL = {"observation_range": (-1.0, 1.0)}
+FIXED_RANGE = {"observation_range": (-1.0, 1.0)}
 
 
-class Code(page.CodeWithThermometers):
-    """The code of a small network."""
+class Code(transcription.CodeWithThermometers):
+    """The binary features of a state that a compiled network returns."""
 
     def __init__(self, readout):
         self.readout, self.n_columns = readout, len(readout.code([0.5, 0.5]))
@@ -26,8 +26,8 @@ class Code(page.CodeWithThermometers):
         return np.array(self.readout.code(state), np.int64)
 
 
-class ActorCritic(page.ActorCritic):
-    """The agent of the page, with transitions of any duration."""
+class ActorCritic(transcription.ActorCritic):
+    """The agent of `docs/examples/sdnn_actor_critic.py`, with transitions of any duration."""
 
     def __init__(self, *arguments):
         super().__init__(*arguments)
@@ -49,11 +49,11 @@ class ActorCritic(page.ActorCritic):
     rate=st.sampled_from([1e-6, 0.3, 1.0]),
     entropy=st.sampled_from([0.0, 0.01, 1.0]),
     scale=st.sampled_from([1.0, 100.0, 1e6, 1e-40]),
-    are_usual=st.booleans(),
+    durations_are_1=st.booleans(),
 )
 @settings(max_examples=40, deadline=None)
-def test_weights_are_those_of_the_numpy_transcription(
-    seed, n_actions, trace_decay, discount, rate, entropy, scale, are_usual
+def test_actions_and_weights_are_those_of_the_numpy_transcription(
+    seed, n_actions, trace_decay, discount, rate, entropy, scale, durations_are_1
 ):
     learning = {
         "learning_rate": rate,
@@ -71,17 +71,17 @@ def test_weights_are_those_of_the_numpy_transcription(
         seed=seed,
     )
     (critic,) = agent.networks
-    transcription = ActorCritic(Code(critic), n_actions, page.Settings(**learning, seed=seed))
-    durations = random_durations(seed, are_usual)
+    slow = ActorCritic(Code(critic), n_actions, transcription.Settings(**learning, seed=seed))
+    durations = random_durations(seed, durations_are_1)
     for state, action, reward, next_state, end in random_transitions(seed, 25, n_actions, scale):
         dt = next(durations)
-        np.testing.assert_array_equal(agent.act(state), transcription.act(state))
-        for learner in (agent, transcription):
+        np.testing.assert_array_equal(agent.act(state), slow.act(state))
+        for learner in (agent, slow):
             learner.learn(state, action, reward, next_state, end == "terminal", dt)
             if end == "limit":
                 learner.begin_episode()
-        assert critic.exponent == transcription.critic.exponent
-        np.testing.assert_array_equal(critic.weights(), transcription.critic.weights)
+        assert critic.exponent == slow.critic.exponent
+        np.testing.assert_array_equal(critic.weights(), slow.critic.weights)
 
 
 def test_an_agent_of_a_bounded_space_acts_without_a_warm_up():
@@ -100,7 +100,7 @@ def test_cartpole_is_balanced_for_300_steps_after_20_000_steps():
 
 def test_in_a_bandit_the_best_arm_becomes_probable_and_the_value_its_mean_reward():
     space, arms = gym.spaces.Box(-1.0, 1.0, (2,), np.float64), gym.spaces.Discrete(3, start=1)
-    agent = SDNNActorCritic(space, arms, seed=1, **STILL)
+    agent = SDNNActorCritic(space, arms, seed=1, **FIXED_RANGE)
     zeros = np.zeros(2)
     np.testing.assert_allclose(agent.action_probabilities(zeros), 1 / 3)
     for _ in range(1500):
@@ -115,7 +115,7 @@ def test_in_a_bandit_the_best_arm_becomes_probable_and_the_value_its_mean_reward
 
 def test_greedy_actions_of_a_box_are_the_mean_of_the_best_one_and_its_neighbours():
     box = gym.spaces.Box(np.array([-1.0, 0.0]), np.array([1.0, 8.0]), dtype=np.float64)
-    agent = SDNNActorCritic(gym.spaces.Box(-1, 1, (2,)), box, seed=2, **STILL)
+    agent = SDNNActorCritic(gym.spaces.Box(-1, 1, (2,)), box, seed=2, **FIXED_RANGE)
     observation = np.array([0.2, -0.4], np.float32)
     for step in range(40):
         action = agent.act(observation)
@@ -144,23 +144,23 @@ def test_q_values_and_epsilon_are_refused_with_their_alternatives():
     assert agent.epsilon == 0
 
 
-def test_a_warm_up_selects_inputs_but_does_not_change_probabilities():
+def test_a_warm_up_selects_relevant_inputs_but_does_not_change_probabilities():
     space = gym.spaces.Box(-np.inf, np.inf, (3,), np.float64)
     agent = SDNNActorCritic(
         space, gym.spaces.Discrete(2), seed=1, inputs="relevant", warm_up_steps=300
     )
     rng, observation = np.random.default_rng(1), np.zeros(3)
-    while agent.is_warming_up:
+    while agent.is_warming_up:  # actions move and rewards pay the first variable; others are noise
         action = agent.act(observation)
-        following = np.array([0.9 * observation[0] + action - 0.5, *rng.normal(size=2)])
-        agent.learn(Transition(observation, action, following[0], following, False))
-        observation = following
+        next_observation = np.array([0.9 * observation[0] + action - 0.5, *rng.normal(size=2)])
+        agent.learn(Transition(observation, action, next_observation[0], next_observation, False))
+        observation = next_observation
     assert ("variable", [0]) in agent.inputs
     np.testing.assert_allclose(agent.action_probabilities(observation), 0.5)
 
 
-def test_running_ranges_include_the_first_observations_of_episodes():
-    # Episodes have one step; all end in the same observation.
+def test_running_ranges_that_include_first_observations_of_episodes_let_an_agent_tell_them_apart():
+    # Episodes have one step and end in zeros, so that only first observations have a range.
     space = gym.spaces.Box(-np.inf, np.inf, (1,), np.float64)
     agent = SDNNActorCritic(space, gym.spaces.Discrete(2), seed=1)
     rng, rewards = np.random.default_rng(1), []
@@ -173,17 +173,17 @@ def test_running_ranges_include_the_first_observations_of_episodes():
     assert np.mean(rewards[-300:]) > 0.7
 
 
-def test_traces_survive_alternating_environments_with_missing_readings():
+def test_traces_survive_alternating_environments_with_missing_values():
     space = gym.spaces.Box(-np.inf, np.inf, (2,), np.float64)
     agent = SDNNActorCritic(space, gym.spaces.Discrete(2), seed=1, missing="code")
     agent.n_environments = 2
     rng, observations = np.random.default_rng(1), np.full((2, 2), np.nan)
-    for step in range(40):
-        i = step % 2
-        action = agent.act(observations[i], environment=i)
-        following = np.array([rng.normal(), np.nan])
-        agent.learn(Transition(observations[i], action, 1.0, following, False), environment=i)
-        observations[i] = following
+    for environment in [0, 1] * 20:
+        observation, next_observation = observations[environment], np.array([rng.normal(), np.nan])
+        action = agent.act(observation, environment=environment)
+        transition = Transition(observation, action, 1.0, next_observation, False)
+        agent.learn(transition, environment=environment)
+        observations[environment] = next_observation
     traces = agent.state()["agent.trace.values"]
     assert len(np.unique(np.abs(traces))) > 3, "traces of several steps differ in size"
 

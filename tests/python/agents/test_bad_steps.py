@@ -9,18 +9,18 @@ from refusals import refuses
 from sdnn.agents import RBFQLearning, UnusableStepError, evaluate
 
 RESULTS = ("reward", "terminated", "truncated")
-OTHERS = {
+MORE_BAD = {
     "a list": [False],
     "an array": np.array([False]),
     "a label": "False",
     "0-d": np.array(False),
 }
-NUMBERS = {"-1", "0", "0.5", "2**20", "2**31", "2**63", "-2**63", "True", "0-d", "an array"}
-"""Rewards; larger ones are numbers, too, but cannot be learned."""
+REWARDS = {"-1", "0", "0.5", "2**20", "2**31", "2**63", "-2**63", "True", "0-d", "an array"}
+"""Labels of values that are valid rewards; larger numbers cannot be learned."""
 
 
 class Point(gym.Env):
-    """A point that rests for four steps; a test may change the results of step 3 and of reset."""
+    """Episodes of four equal steps; a test may change the results of step 3 and of reset."""
 
     observation_space = gym.spaces.Box(-1.0, 1.0, (2,), np.float64)
     action_space = gym.spaces.Discrete(2)
@@ -40,7 +40,7 @@ class Point(gym.Env):
 
 
 class Points(gym.vector.VectorEnv):
-    """Two points without ends of episodes; a test may replace columns of their results."""
+    """Two environments without ends of episodes; a test may replace columns of their results."""
 
     metadata = {"autoreset_mode": "Disabled"}  # noqa: RUF012
     num_envs = 2
@@ -71,14 +71,16 @@ def evaluated(env):
 
 
 def with_value(name, value):
-    index = 1 + RESULTS.index(name)
+    """Return a function that replaces a result of `step`."""
+    index = 1 + RESULTS.index(name)  # an observation comes first
     return lambda results: (*results[:index], value, *results[index + 1 :])
 
 
 def bad_values(name):
-    good = NUMBERS if name == "reward" else {"True"}
-    listed = {label: make() for label, make in BAD.items()} | OTHERS
-    return {label: value for label, value in listed.items() if label not in good}
+    """Return values, by label, that are invalid for a result of `step`."""
+    good = REWARDS if name == "reward" else {"True"}
+    values = {label: make() for label, make in BAD.items()} | MORE_BAD
+    return {label: value for label, value in values.items() if label not in good}
 
 
 @pytest.mark.parametrize("use", [trained, evaluated])
@@ -93,16 +95,16 @@ def test_invalid_rewards_and_flags_are_refused_with_the_number_of_the_step(name,
 
 @pytest.mark.parametrize("name", RESULTS[1:])
 def test_numpy_bools_end_an_episode_like_python_bools(name):
-    for use in (trained, evaluated):
-        assert use(Point(with_value(name, np.True_))) is not None
-    # The flag is set in step 3 of each of two evaluation episodes.
-    assert evaluated(Point(with_value(name, np.True_))).lengths.tolist() == [3, 3]
+    env = Point(with_value(name, np.True_))  # in step 3
+    assert trained(env).returns.tolist() == [3.0] * 6  # of 20 steps, each with a reward of 1
+    assert evaluated(env).lengths.tolist() == [3, 3]
 
 
 @pytest.mark.parametrize("name", RESULTS)
 def test_rewards_and_flags_of_a_vector_need_a_valid_value_for_each_environment(name):
     for label, value in bad_values(name).items():
-        for column in (value, [value] * 3 if label == "0-d" else [value] * 2):
+        # Two arrays without dimensions would be two valid flags.
+        for column in (value, [value] * (3 if label == "0-d" else 2)):
             with pytest.raises(UnusableStepError, match=rf"\b{name}\b"):
                 trained(Points(**{name: column}))
     assert trained(Points(**{name: [False, False]})).n_steps == 20
@@ -114,20 +116,16 @@ def test_rewards_and_flags_of_a_vector_need_a_valid_value_for_each_environment(n
 def test_invalid_observations_of_a_vector_are_refused_with_the_number_of_the_step(observation):
     bad = Point(lambda results: (observation, *results[1:]))
     envs = gym.vector.SyncVectorEnv([Point, lambda: bad])
-    # Two environments have learned two steps each; number 5 is the first of the third pair.
+    # Two environments have learned two steps each, 0 to 3; the bad one has number 5 of 4 and 5.
     with pytest.raises(UnusableStepError, match="in step 5: next_observation must"):
         trained(envs)
 
 
 @pytest.mark.parametrize("use", [trained, evaluated])
-def test_results_of_another_length_or_form_are_refused(use):
-    for n in (1, 4, 6):  # instead of five
-        with pytest.raises(UnusableStepError, match=rf"\b{n}\b"):
-            use(Point(lambda results, n=n: (results * 2)[:n]))
-    for first in (np.zeros(2), (np.zeros(2),), (np.zeros(2), None), (0.0, 0.0)):
-        refuses(
-            "observation",
-            use,
-            Point(change_reset=lambda results, first=first: first),
-            error=UnusableStepError,
-        )
+def test_results_of_step_of_another_length_and_malformed_ones_of_reset_are_refused(use):
+    for n_results in (1, 4, 6):  # instead of five
+        with pytest.raises(UnusableStepError, match=rf"\b{n_results}\b"):
+            use(Point(lambda results, n_results=n_results: (results * 2)[:n_results]))
+    for bad_reset in (np.zeros(2), (np.zeros(2),), (np.zeros(2), None), (0.0, 0.0)):
+        env = Point(change_reset=lambda results, bad_reset=bad_reset: bad_reset)
+        refuses("observation", use, env, error=UnusableStepError)

@@ -61,29 +61,28 @@ class Courier(gym.Env):
         return np.array([0.5]), 2.0 if is_far else 1.0, False, self.n == 50, info
 
 
-def policy(**settings):
-    return {"discount": 0.9, "epsilon": 0.3} | settings
-
-
+EXPLORING = {"discount": 0.9, "epsilon": 0.3}
 AGENTS = {
     SDNNQLambda: (
         LinearSDNNConfig(averaging_interval=0),
-        QLambdaConfig(**policy(final_learning_rate=0.02, schedule_steps=500, final_epsilon=0.3)),
+        QLambdaConfig(**EXPLORING, final_learning_rate=0.02, schedule_steps=500, final_epsilon=0.3),
     ),
     SDNNActorCritic: (LinearSDNNConfig(), ActorCriticConfig(discount=0.9)),
     SDNNQLearning: (
         SDNNCConfig(n_hidden_units=400, n_active_units=200, n_pattern_units=20),
-        QLearningConfig(**policy(n_greedy_steps=0, learning_rate=0.3, value_range="adaptive")),
+        QLearningConfig(**EXPLORING, n_greedy_steps=0, learning_rate=0.3, value_range="adaptive"),
     ),
-    RBFQLearning: (RBFNetworkConfig(n_actions=2), QLearningConfig(**policy(n_greedy_steps=0))),
+    RBFQLearning: (RBFNetworkConfig(n_actions=2), QLearningConfig(**EXPLORING, n_greedy_steps=0)),
     FuzzyQLearning: (
         FuzzyRulesConfig(n_actions=2, n_sets=2),
-        FuzzyQLearningConfig(**policy(n_greedy_steps=0)),
+        FuzzyQLearningConfig(**EXPLORING, n_greedy_steps=0),
     ),
 }
+"""Approximator and learning rule of each class of agents."""
 
 
-def couriers(agent_class, **options):
+def agent_and_courier(agent_class, **options):
+    """Return an agent, and a function that makes its environment, with durations or without."""
     is_fuzzy = agent_class is FuzzyQLearning
     actions = gym.spaces.Box(-1.0, 1.0, (1,)) if is_fuzzy else NEAR_OR_FAR
     approximator, learning = AGENTS[agent_class]
@@ -98,26 +97,24 @@ def couriers(agent_class, **options):
 
 @pytest.mark.parametrize("agent_class", AGENTS)
 def test_a_long_action_with_the_higher_reward_is_chosen_only_without_durations(agent_class):
-    chosen = {}
+    chooses_far = {}
     for has_durations in (False, True):
-        agent, courier = couriers(agent_class)
+        agent, courier = agent_and_courier(agent_class)
         agent.train(courier(has_durations), steps=4000, seed=1)
-        chosen[has_durations] = float(np.ravel(agent.act([0.5], explore=False))[0]) > 0
-    assert chosen == {False: True, True: False}
+        chooses_far[has_durations] = float(np.ravel(agent.act([0.5], explore=False))[0]) > 0
+    assert chooses_far == {False: True, True: False}
 
 
 def test_values_are_those_of_a_semi_markov_process():
     # The docstring of `Courier` derives the expected values of a near and of a far job.
-    agent, courier = couriers(SDNNQLambda)
-    agent.train(courier(True), steps=20_000, seed=1)
-    np.testing.assert_allclose(agent.q_values([0.5]), [10.0, 2 + 0.9**5 * 10], rtol=0.03)
-    agent, courier = couriers(SDNNQLambda)
-    agent.train(courier(False), steps=20_000, seed=1)
-    np.testing.assert_allclose(agent.q_values([0.5]), [19.0, 20.0], rtol=0.03)
+    for has_durations, near, far in ((True, 10.0, 2 + 0.9**5 * 10), (False, 19.0, 20.0)):
+        agent, courier = agent_and_courier(SDNNQLambda)
+        agent.train(courier(has_durations), steps=20_000, seed=1)
+        np.testing.assert_allclose(agent.q_values([0.5]), [near, far], rtol=0.03)
 
 
-def random_steps(seed, n, agent_class=SDNNQLambda):
-    """Yield transitions of episodes, half of them usual steps."""
+def random_steps(seed, n):
+    """Yield transitions of episodes, half of which have a duration of 1."""
     rng = np.random.default_rng(seed)
     observation = rng.random(1)
     for _ in range(n):
@@ -128,58 +125,55 @@ def random_steps(seed, n, agent_class=SDNNQLambda):
         observation = rng.random(1) if ends else next_observation
 
 
-OFF_POLICY = [agent_class for agent_class in AGENTS if agent_class is not FuzzyQLearning]
-OPTIONS = {
-    "sarsa": {"learning": QLambdaConfig(bootstrap="sarsa", discount=0.9)},
-    "n steps": {"learning": QLearningConfig(n_steps=4, value_range="adaptive", discount=0.8)},
-}
+NEW_AGENTS = {
+    agent_class.__name__: lambda agent_class=agent_class: agent_and_courier(agent_class)[0]
+    for agent_class in AGENTS
+    if agent_class is not FuzzyQLearning  # which learns only its own actions
+} | {
+    "Sarsa": lambda: SDNNQLambda(
+        UNIT, NEAR_OR_FAR, seed=1, learning=QLambdaConfig(bootstrap="sarsa", discount=0.9)
+    ),
+    "4-step returns": lambda: SDNNQLearning(
+        UNIT, NEAR_OR_FAR, seed=1,
+        learning=QLearningConfig(n_steps=4, value_range="adaptive", discount=0.8),
+    ),
+}  # fmt: skip
 
 
-def agents():
-    for agent_class in OFF_POLICY:
-        yield agent_class.__name__, lambda agent_class=agent_class: couriers(agent_class)[0]
-    yield "sarsa", lambda: SDNNQLambda(UNIT, NEAR_OR_FAR, seed=1, **OPTIONS["sarsa"])
-    yield ("n steps", lambda: SDNNQLearning(UNIT, NEAR_OR_FAR, seed=1, **OPTIONS["n steps"]))
-
-
-MAKERS = dict(agents())
-
-
-@pytest.mark.parametrize("name", MAKERS)
+@pytest.mark.parametrize("name", NEW_AGENTS)
 def test_durations_of_1_change_nothing_and_are_not_saved(name):
-    agent, same, other = MAKERS[name](), MAKERS[name](), MAKERS[name]()
+    without_durations, with_1, with_durations = (NEW_AGENTS[name]() for _ in range(3))
     for transition in random_steps(1, 60):
-        agent.learn(Transition(*transition[:5]))
-        same.learn(transition._replace(dt=1.0))
-        other.learn(transition)
-    assert states_equal(agent, same)
-    assert not any("dt" in part for part in agent.state())
-    is_equal = [
-        np.array_equal(array, other.state().get(part)) for part, array in agent.state().items()
-    ]
+        without_durations.learn(Transition(*transition[:5]))
+        with_1.learn(transition._replace(dt=1.0))
+        with_durations.learn(transition)
+    assert states_equal(without_durations, with_1)
+    state, other_state = without_durations.state(), with_durations.state()
+    assert not any("dt" in part for part in state)
+    is_equal = [np.array_equal(array, other_state.get(part)) for part, array in state.items()]
     assert not all(is_equal), "other durations change something"
 
 
-@pytest.mark.parametrize("name", MAKERS)
-def test_a_saved_agent_continues_with_the_same_bits_after_transitions_of_any_duration(
+@pytest.mark.parametrize("name", NEW_AGENTS)
+def test_an_agent_saved_between_transitions_of_any_duration_continues_with_the_same_bits(
     name, tmp_path
 ):
-    agent, same = MAKERS[name](), MAKERS[name]()
+    agent, resumed = NEW_AGENTS[name](), NEW_AGENTS[name]()
     for t, transition in enumerate(random_steps(2, 80)):
         agent.learn(transition)
-        same.learn(transition)
-        if t % 9 == 4:
-            same.save(tmp_path / "agent.safetensors")
-            same = load_agent(tmp_path / "agent.safetensors")
-    assert states_equal(agent, same)
+        resumed.learn(transition)
+        if t % 9 == 4:  # at various steps of episodes
+            resumed.save(tmp_path / "agent.safetensors")
+            resumed = load_agent(tmp_path / "agent.safetensors")
+    assert states_equal(agent, resumed)
 
 
 @pytest.mark.parametrize("agent_class", [SDNNQLambda, SDNNQLearning])
 def test_a_warm_up_keeps_durations_and_learns_them_when_it_is_over(agent_class, tmp_path):
-    def warming_up(steps):
-        unknown = gym.spaces.Box(-np.inf, np.inf, (1,), np.float64)
+    def after_a_warm_up_of_30(steps):
+        unbounded = gym.spaces.Box(-np.inf, np.inf, (1,), np.float64)
         agent = agent_class(
-            unknown, NEAR_OR_FAR, seed=1, warm_up_steps=30, inputs="all",
+            unbounded, NEAR_OR_FAR, seed=1, warm_up_steps=30, inputs="all",
             observation_range="adaptive",
         )  # fmt: skip
         for t, transition in enumerate(steps):
@@ -191,29 +185,31 @@ def test_a_warm_up_keeps_durations_and_learns_them_when_it_is_over(agent_class, 
         return agent
 
     steps = list(random_steps(3, 31))
-    usual = [transition._replace(dt=1.0) for transition in steps]
-    agent = warming_up(steps[:30])
+    agent = after_a_warm_up_of_30(steps[:30])
     assert not agent.is_warming_up
-    later = agent_class(
+    without_warm_up = agent_class(
         UNIT, NEAR_OR_FAR, seed=1, inputs="all",
         observation_range=tuple(bound.item() for bound in agent.observation_range),
     )  # fmt: skip
     for transition in steps[:30]:
-        later.learn(transition)
-    np.testing.assert_array_equal(agent.networks[0].weights(), later.networks[0].weights())
-    assert not states_equal(warming_up(steps), warming_up([*usual[:30], steps[30]]))
+        without_warm_up.learn(transition)
+    weights = without_warm_up.networks[0].weights()
+    np.testing.assert_array_equal(agent.networks[0].weights(), weights)
+    all_of_1 = [transition._replace(dt=1.0) for transition in steps[:30]]
+    other = after_a_warm_up_of_30([*all_of_1, steps[30]])
+    assert not states_equal(after_a_warm_up_of_30(steps), other)
 
 
 @pytest.mark.parametrize("agent_class", AGENTS)
 def test_trainings_with_durations_resume_exactly(agent_class, tmp_path):
-    class Random(Courier):
+    class RandomDurations(Courier):
         def step(self, action):
             *outcome, _ = super().step(action)
             return *outcome, {"dt": self.np_random.uniform(0.1, 9.0)}
 
     def new_training(*callbacks):
-        agent, courier = couriers(agent_class, observation_range=None, warm_up_steps=20)
-        env = Random(True, courier(True).action_space)
+        agent, courier = agent_and_courier(agent_class, observation_range=None, warm_up_steps=20)
+        env = RandomDurations(True, courier(True).action_space)
         return Training(agent, env, steps=120, seed=1, callbacks=callbacks)
 
     path = tmp_path / "training.safetensors"
@@ -222,9 +218,9 @@ def test_trainings_with_durations_resume_exactly(agent_class, tmp_path):
 
 @pytest.mark.parametrize("mode", ["NEXT_STEP", "SAME_STEP", "DISABLED"])
 @pytest.mark.parametrize("vector_class", [gym.vector.SyncVectorEnv, gym.vector.AsyncVectorEnv])
-def test_vectors_have_a_duration_for_each_environment(mode, vector_class):
+def test_durations_are_learned_alike_from_all_vectors_and_autoreset_modes(mode, vector_class):
     def trained(vector_class, mode, has_durations=True):
-        agent, courier = couriers(SDNNQLambda)
+        agent, courier = agent_and_courier(SDNNQLambda)
         envs = vector_class(
             [lambda: courier(has_durations)] * 2, autoreset_mode=gym.vector.AutoresetMode[mode]
         )
@@ -240,15 +236,14 @@ def test_vectors_have_a_duration_for_each_environment(mode, vector_class):
 def test_durations_are_learned_from_a_vector_that_resets_its_environments_itself(monkeypatch):
     monkeypatch.setattr("sdnn.training.vectors._resets_each", lambda env: False)
 
-    class Opaque(gym.vector.SyncVectorEnv):
-        """A vector whose environments are not stepped one by one."""
+    class OtherVectorEnv(gym.vector.SyncVectorEnv):
+        """A vector of an unknown class, whose environments are not stepped one by one."""
 
     def trained(has_durations, mode):
-        agent, courier = couriers(SDNNQLambda)
-        modes = gym.vector.AutoresetMode
-        agent.train(
-            Opaque([lambda: courier(has_durations)] * 2, autoreset_mode=modes[mode]), steps=300
-        )
+        agent, courier = agent_and_courier(SDNNQLambda)
+        autoreset_mode = gym.vector.AutoresetMode[mode]
+        makers = [lambda: courier(has_durations)] * 2
+        agent.train(OtherVectorEnv(makers, autoreset_mode=autoreset_mode), steps=300)
         return agent
 
     for mode in ("NEXT_STEP", "SAME_STEP"):
@@ -257,18 +252,17 @@ def test_durations_are_learned_from_a_vector_that_resets_its_environments_itself
 
 
 @pytest.mark.parametrize("name", ["dt", "dts"])
-def test_logs_of_every_form_have_durations(name, tmp_path):
+def test_arrays_lines_and_tables_with_durations_are_learned_like_their_transitions(name, tmp_path):
     steps = list(random_steps(4, 40))
-    agent = couriers(SDNNQLambda)[0]
+    agent = agent_and_courier(SDNNQLambda)[0]
     learn_from(agent, steps)
-    columns = ("observations", "actions", "rewards", "next_observations", "terminations")
+    observations, actions, rewards, next_observations, terminations, _, durations = map(
+        np.array, zip(*steps, strict=True)
+    )
     arrays = {
-        column: np.array(values)
-        for column, values in zip(
-            columns, zip(*(step[:5] for step in steps), strict=True), strict=True
-        )
-    }
-    arrays[name] = np.array([step.dt for step in steps])
+        "observations": observations, "actions": actions, "rewards": rewards,
+        "next_observations": next_observations, "terminations": terminations, name: durations,
+    }  # fmt: skip
     table = tmp_path / "log.csv"
     with table.open("w") as file:
         print(f"observation_0,action,reward,next_observation_0,terminated,{name}", file=file)
@@ -282,22 +276,22 @@ def test_logs_of_every_form_have_durations(name, tmp_path):
             row[name] = row.pop("dt")
             print(json.dumps(row), file=file)
     for log in (arrays, lines, table):
-        other = couriers(SDNNQLambda)[0]
+        other = agent_and_courier(SDNNQLambda)[0]
         learn_from(other, log)
         assert states_equal(agent, other)
 
 
 @pytest.mark.parametrize("dt", [2.5, np.float32(2.5), np.array(2.5), np.array([2.5])])
 def test_durations_may_be_arrays_of_one_number(dt):
-    agents = [couriers(SDNNQLambda)[0] for _ in range(2)]
+    agents = [agent_and_courier(SDNNQLambda)[0] for _ in range(2)]
     for agent, duration in zip(agents, (2.5, dt), strict=True):
         for _ in range(2):
             agent.learn(Transition([0.5], 0, 1.0, [0.5], False, None, duration))
     assert states_equal(*agents)
 
 
-def test_imitated_returns_are_discounted_by_durations():
-    agent = couriers(SDNNQLambda)[0]
+def test_returns_of_imitated_episodes_are_discounted_by_durations():
+    agent = agent_and_courier(SDNNQLambda)[0]
     steps = [
         Transition([0.0], 0, 4.0, [1.0], False, None, 3.0),
         Transition([1.0], 0, 8.0, [0.0], True),
@@ -309,18 +303,19 @@ def test_imitated_returns_are_discounted_by_durations():
 
 @pytest.mark.parametrize("dt", BAD_DURATIONS)
 @pytest.mark.parametrize("agent_class", AGENTS)
-def test_impossible_durations_are_refused_and_change_nothing(agent_class, dt):
-    agent, courier = couriers(agent_class)
+def test_impossible_durations_of_transitions_logs_and_environments_are_refused(agent_class, dt):
+    agent, courier = agent_and_courier(agent_class)
     action = agent.act([0.5])
     before = agent.state()
     transition = Transition([0.5], action, 1.0, [0.5], False, None, dt)
     for call in (agent.learn, agent.check):
         refuses("dt", call, transition)
-    if agent_class is not FuzzyQLearning:
+    if agent_class is not FuzzyQLearning:  # which learns from no log
         message = "dataset, episode 0, transition 1: dt must be"
         with pytest.raises((TypeError, ValueError), match=message):
             learn_from(agent, [Transition([0.5], action, 1.0, [0.5], False), transition])
-    assert all(np.array_equal(values, agent.state()[name]) for name, values in before.items())
+    after = agent.state()
+    assert all(np.array_equal(values, after[name]) for name, values in before.items())
 
     class BadThirdStep(Courier):
         def step(self, action):
@@ -334,19 +329,18 @@ def test_impossible_durations_are_refused_and_change_nothing(agent_class, dt):
         agent.train(gym.vector.SyncVectorEnv([lambda: env]), steps=10)
 
 
-def test_an_environment_that_announces_durations_must_give_them():
-    class Silent(Courier):
+def test_an_environment_whose_metadata_announce_durations_must_return_them():
+    class WithoutInfo(Courier):
         def step(self, action):
             return *super().step(action)[:4], {}
 
-    agent = couriers(SDNNQLambda)[0]
+    agent = agent_and_courier(SDNNQLambda)[0]
     with pytest.raises(UnusableStepError, match="info must have 'dt'"):
-        agent.train(Silent(), steps=10)
+        agent.train(WithoutInfo(), steps=10)
     for vector_class in (gym.vector.SyncVectorEnv, gym.vector.AsyncVectorEnv):
-        with pytest.raises(
-            UnusableStepError, match=r"\bdt\b.*environment 1\b|environment 1: .*'dt'"
-        ):
-            agent.train(vector_class([Courier, Silent]), steps=10)
+        names_second_one = r"\bdt\b.*environment 1\b|environment 1: .*'dt'"
+        with pytest.raises(UnusableStepError, match=names_second_one):
+            agent.train(vector_class([Courier, WithoutInfo]), steps=10)
 
 
 def test_values_are_finite_at_the_shortest_and_longest_duration_and_any_discount():
@@ -359,6 +353,7 @@ def test_values_are_finite_at_the_shortest_and_longest_duration_and_any_discount
 
 
 def test_a_fuzzy_agent_is_saved_after_many_transitions_of_the_shortest_duration(tmp_path):
+    # Traces decay by only 0.99 * 0.5^0.001 in each transition, so that many are saved.
     agent = FuzzyQLearning(
         UNIT,
         gym.spaces.Box(-1.0, 1.0, (1,)),
@@ -377,7 +372,7 @@ def test_a_fuzzy_agent_is_saved_after_many_transitions_of_the_shortest_duration(
     assert states_equal(load_agent(tmp_path / "agent.safetensors"), agent)
 
 
-def test_powers_are_those_of_repeated_products():
+def test_a_whole_power_of_a_discount_is_its_repeated_product():
     for discount in (0.0, 0.3, 0.9, 0.999, 1.0):
         for dt in (1, 2, 7, 40):
             assert _core.power(discount, dt) == pytest.approx(np.prod([discount] * dt), rel=1e-14)

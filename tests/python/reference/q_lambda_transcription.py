@@ -30,11 +30,11 @@ def random_transitions(seed, n_steps, n_actions, scale):
         state = next_state if end == "none" else rng.random(2)
 
 
-def random_durations(seed, are_usual):
-    """Yield numbers of usual steps, whole ones and others."""
+def random_durations(seed, are_1):
+    """Yield durations: always 1, or 1, other whole numbers and fractions."""
     rng = np.random.default_rng(seed)
     while True:
-        yield 1.0 if are_usual else float(rng.choice([1.0, 2.0, 5.0, 0.3, rng.uniform(0.001, 20)]))
+        yield 1.0 if are_1 else float(rng.choice([1.0, 2.0, 5.0, 0.3, rng.uniform(0.001, 20)]))
 
 
 class VariableDiscount:
