@@ -40,14 +40,16 @@ def trained():
 
 def test_predict_accepts_one_observation_or_a_batch(trained):
     agent, env, _ = trained
-    several = np.stack([env.reset(seed=n)[0] for n in range(5)])
-    actions, state = agent.predict(several, None, np.ones(5, bool), deterministic=True)
+    observations = np.stack([env.reset(seed=n)[0] for n in range(5)])
+    actions, state = agent.predict(observations, None, np.ones(5, bool), deterministic=True)
     assert state is None
-    assert actions.tolist() == [agent.act(observation, explore=False) for observation in several]
-    assert agent.predict(several[0])[0] == actions[0]
-    assert agent.predict(several[0], deterministic=False)[0] in env.action_space
-    refuses("deterministic", agent.predict, several[0], deterministic="yes", error=TypeError)
-    refuses("observation", agent.predict, several[:0])
+    assert actions.tolist() == [
+        agent.act(observation, explore=False) for observation in observations
+    ]
+    assert agent.predict(observations[0])[0] == actions[0]
+    assert agent.predict(observations[0], deterministic=False)[0] in env.action_space
+    refuses("deterministic", agent.predict, observations[0], deterministic="yes", error=TypeError)
+    refuses("observation", agent.predict, observations[:0])
 
 
 def test_predict_accepts_batches_of_discrete_and_box_observations():
@@ -61,21 +63,24 @@ def test_predict_accepts_batches_of_discrete_and_box_observations():
     assert agent.predict(np.zeros(3, np.float32))[0].shape == (1,)
 
 
-@pytest.mark.parametrize("kind", [gym.spaces.Dict, gym.spaces.Tuple])
-def test_predict_accepts_batches_of_dict_and_tuple_observations(kind):
-    parts = gym.spaces.Box(-1, 1, (2,)), gym.spaces.Discrete(3)
-    space = kind(dict(zip("ab", parts, strict=True))) if kind is gym.spaces.Dict else kind(parts)
+@pytest.mark.parametrize("space_class", [gym.spaces.Dict, gym.spaces.Tuple])
+def test_predict_accepts_batches_of_dict_and_tuple_observations(space_class):
+    is_dict = space_class is gym.spaces.Dict
+    box, discrete = gym.spaces.Box(-1, 1, (2,)), gym.spaces.Discrete(3)
+    space = space_class({"a": box, "b": discrete} if is_dict else (box, discrete))
     agent = SDNNQLambda(space, gym.spaces.Discrete(9), inputs="all", angle_pairs="none")
     space.seed(1)
-    several = [space.sample() for _ in range(4)]
-    for observation in several:
-        agent.learn(Transition(observation, 7, 1.0, observation, False))  # the only reward
+    observations = [space.sample() for _ in range(4)]
+    for observation in observations:
+        agent.learn(Transition(observation, 7, 1.0, observation, False))  # only action 7 pays
     batch = gym.vector.utils.create_empty_array(space, 4)
-    batch = gym.vector.utils.concatenate(space, several, batch)
+    batch = gym.vector.utils.concatenate(space, observations, batch)
     assert agent.predict(batch)[0].tolist() == [7] * 4
-    assert agent.predict(several[0])[0] == 7
-    uneven = {**batch, "b": batch["b"][:3]} if kind is gym.spaces.Dict else (batch[0], batch[1][:3])
-    refuses("observation", agent.predict, uneven)
+    assert agent.predict(observations[0])[0] == 7
+    of_unequal_lengths = (
+        {"a": batch["a"], "b": batch["b"][:3]} if is_dict else (batch[0], batch[1][:3])
+    )
+    refuses("observation", agent.predict, of_unequal_lengths)
 
 
 CALLS = {
@@ -95,14 +100,15 @@ CALLS = {
     StopTrainingOnRewardThreshold: {"reward_threshold": "mean mean_return"},
     QLambdaConfig: {"gamma": "mean discount"}, SDNNRegressor: {"epochs": "mean max_iter"},
 }  # fmt: skip
-"""Names that functions do not have, and what the error must have."""
+"""Arguments of other libraries by function, and the hint that the error must give."""
 
 
 @pytest.mark.parametrize("function", CALLS, ids=lambda call: call.__qualname__)
 def test_arguments_of_other_libraries_are_refused_with_the_right_name(trained, function):
+    agent = trained[0]
     for name, hint in CALLS[function].items():
         with pytest.raises(TypeError, match=f"^{name} .*{re.escape(hint)}") as refused:
-            function(*trained[:1], **{name: 1})
+            function(agent, **{name: 1})
         assert refused.value.argument == name
 
 
@@ -114,7 +120,7 @@ ATTRIBUTES = {
     "verbose": "a bar shows by itself",
     "fit": "train", "set_random_seed": "seed=1", "n_envs": "n_environments",
 }  # fmt: skip
-"""Attributes that agents do not have, and what the error must have."""
+"""Attributes of other libraries' agents, and the hint that the error must give."""
 
 IMPORTS = {
     "PPO": "SDNNQLambda(env)", "evaluate_policy": "evaluate", "EvalCallback": "evaluate_every=",
@@ -132,7 +138,7 @@ def test_attributes_of_other_libraries_are_refused_with_the_right_name(trained, 
     assert not hasattr(trained[0], name)
 
 
-def test_unknown_attributes_and_those_that_raise_have_their_own_error(trained):
+def test_unknown_attributes_have_the_error_of_python_and_raising_ones_their_own(trained):
     with pytest.raises(AttributeError, match="'SDNNQLambda' object has no attribute 'qwerty'"):
         trained[0].qwerty  # noqa: B018
     with pytest.raises(AttributeError, match="learns no values of actions"):
@@ -175,7 +181,7 @@ def test_constructors_accept_environments_and_vectors_in_the_place_of_spaces():
     assert "observation_space" in inspect.signature(SDNNQLambda).parameters
 
 
-def test_environments_may_be_given_by_their_ids():
+def test_constructors_train_and_evaluate_accept_ids_and_refuse_unknown_ones():
     agent, other = SDNNQLambda("CartPole-v1", seed=1), SDNNQLambda(gym.make("CartPole-v1"), seed=1)
     assert agent.description() == other.description()
     agent.train("CartPole-v1", steps=300)
@@ -186,7 +192,7 @@ def test_environments_may_be_given_by_their_ids():
     )
     refuses("observation_space", SDNNQLambda, "CartPoll-v1")
     refuses("env", agent.train, "CartPoll-v1", steps=9)
-    refuses("CartPole", evaluate, agent, "CartPoll-v1")
+    refuses("CartPole", evaluate, agent, "CartPoll-v1")  # suggests the right id
     refuses("observation_space", SDNNQLambda, "MlpPolicy", "CartPole-v1", error=TypeError)
 
 
@@ -252,17 +258,17 @@ def test_an_agent_counts_all_steps_that_it_has_learned(name, tmp_path):
     assert agent.n_learned == n_learned + 1
 
 
-def test_small_curves_have_the_means_of_equal_parts():
+def test_small_curves_have_the_means_of_equally_many_returns_but_none_without_finite_returns():
     svg = curve_svg([1.0, 3.0, 5.0, 7.0], n_points=2)
     # Means of the pairs are 2 and 6: from the lower left to the upper right corner of 240 x 48
     # pixels with a margin of 2.
     assert 'points="2.0,50.0 242.0,2.0"' in svg
     assert "4 returns, 2 to 6" in svg
+    assert "2.0,50.0" in curve_svg([0.0] * 5), "equal returns are at the lower margin"
     assert curve_svg([1.0, float("inf")]) == curve_svg([]) == ""
-    assert "2.0,50.0" in curve_svg([0.0] * 5)
 
 
-class Means(Callback):
+class ScriptedEvaluations(Callback):
     """Replaces the mean returns of evaluations."""
 
     def __init__(self, means):
@@ -274,7 +280,8 @@ class Means(Callback):
             training.evaluations[-1] = (step, next(self.means))
 
 
-def run(tmp_path, means, *callbacks):
+def train_with_evaluations(means, *callbacks):
+    """Train for 60 steps, with these mean returns of an evaluation after every 10 steps."""
     env = gym.make("CartPole-v1")
     agent = SDNNQLambda(
         env.observation_space, env.action_space, inputs="all", angle_pairs="none",
@@ -282,7 +289,7 @@ def run(tmp_path, means, *callbacks):
     )  # fmt: skip
     training = Training(
         agent, env, steps=60, evaluate_every=10, evaluation_episodes=1,
-        evaluation_env=gym.make("CartPole-v1"), callbacks=[Means(means), *callbacks],
+        evaluation_env=gym.make("CartPole-v1"), callbacks=[ScriptedEvaluations(means), *callbacks],
     )  # fmt: skip
     training.run()
     return training
@@ -291,24 +298,21 @@ def run(tmp_path, means, *callbacks):
 def test_save_best_agent_saves_at_each_better_evaluation(tmp_path):
     path = tmp_path / "best.safetensors"
 
-    class Note(Callback):
-        def __init__(self):
-            self.saved = []
+    steps_of_files = {}
 
+    class NoteNewFiles(Callback):
         def on_row(self, training, row):
             if row["kind"] == "evaluation":
-                bytes_now = path.read_bytes()
-                if not self.saved or self.saved[-1][1] != bytes_now:
-                    self.saved.append((training.n_steps, bytes_now))
+                steps_of_files.setdefault(path.read_bytes(), training.n_steps)
 
-    note = Note()  # evaluations every 10 steps, the first, second and fifth of which are the best
-    run(tmp_path, [1.0, 3.0, 2.0, 3.0, 4.0, 0.0], SaveBestAgent(path), note)
-    assert [steps for steps, _ in note.saved] == [10, 20, 50]
+    means = [1.0, 3.0, 2.0, 3.0, 4.0, 0.0]  # the first, second and fifth exceed all before
+    train_with_evaluations(means, SaveBestAgent(path), NoteNewFiles())
+    assert list(steps_of_files.values()) == [10, 20, 50]
     assert isinstance(load_agent(path), SDNNQLambda)
 
 
 class ScriptedReturns(gym.Env):
-    """Has episodes of one step with these returns."""
+    """Episodes of one step with these returns."""
 
     observation_space, action_space = gym.spaces.Box(0, 1, (1,)), gym.spaces.Discrete(2)
 
@@ -339,34 +343,33 @@ RETURNS_OF_PAIRS = [1, 3, 4, -1, 2, 3, 0, 5, 9, 8]
 """Their sums in pairs are 4, 3, 5, 5 and 17: better than all before after 2, 6 and 10 episodes."""
 
 
-class Part(NamedTuple):
+class TrainingPart(NamedTuple):
+    """Returns of episodes of one step; the callback is only used with a block length."""
+
     returns: list
     block_length: int | None
 
 
 @pytest.fixture
 def steps_of_saves(tmp_path):
-    """Trains in parts, and returns the steps after which `SaveBestAgent` saved the agent.
-
-    A part has returns of episodes of one step, and the length of blocks, or None without the
-    callback.
-    """
+    """Trains in parts, and returns the steps after which `SaveBestAgent` saved the agent."""
 
     def steps_after_which_the_best_was_saved(*parts):
-        path, n_learned, steps = tmp_path / "training.safetensors", 0, []
-        for part in parts:
-            returns, episodes = part.returns, part.block_length
+        path, n_steps, steps = tmp_path / "training.safetensors", 0, []
+        for returns, block_length in parts:
             env = ScriptedReturns(returns)
-            n_learned += len(returns)
-            best = BestSteps(tmp_path / "best.safetensors", episodes) if episodes else Callback()
-            options = {"steps": n_learned, "callbacks": [best]}
+            n_steps += len(returns)
+            callback = Callback()
+            if block_length is not None:
+                callback = BestSteps(tmp_path / "best.safetensors", block_length)
+            options = {"steps": n_steps, "callbacks": [callback]}
             if path.exists():
                 training = Training.load(path, env, **options)
             else:
                 training = Training(SDNNQLambda(env, inputs="all"), env, **options)
             training.run()
             training.save(path)
-            steps += best.steps if episodes else []
+            steps += callback.steps if block_length is not None else []
         return steps
 
     return steps_after_which_the_best_was_saved
@@ -374,7 +377,7 @@ def steps_of_saves(tmp_path):
 
 def test_save_best_agent_saves_after_each_pair_of_episodes_with_a_better_sum(steps_of_saves):
     # Each episode has one step. Sums of the pairs 1, 3; 4, -1; ... are 4, 3, 5, 5 and 17.
-    assert steps_of_saves(Part(RETURNS_OF_PAIRS, block_length=2)) == [2, 6, 10]
+    assert steps_of_saves(TrainingPart(RETURNS_OF_PAIRS, block_length=2)) == [2, 6, 10]
 
 
 def test_save_best_agent_refuses_impossible_lengths_of_blocks(tmp_path):
@@ -386,57 +389,62 @@ def test_save_best_agent_refuses_impossible_lengths_of_blocks(tmp_path):
 def test_a_resumed_training_continues_its_block_of_episodes(steps_of_saves, n_first):
     first, second = RETURNS_OF_PAIRS[:n_first], RETURNS_OF_PAIRS[n_first:]
     # The whole training saves after 2, 6 and 10 steps, wherever it is divided.
-    assert steps_of_saves(Part(first, block_length=2), Part(second, block_length=2)) == [2, 6, 10]
+    assert steps_of_saves(
+        TrainingPart(first, block_length=2), TrainingPart(second, block_length=2)
+    ) == [2, 6, 10]
 
 
 def test_the_best_block_is_remembered_during_a_training_without_the_callback(steps_of_saves):
     # Only the first and the last of four pairs are better than all before, after 2 and 8 episodes.
-    first, last = Part([100, 100], block_length=2), Part([2, 2, 101, 101], block_length=2)
-    without_callback = Part([1, 1], block_length=None)
-    assert steps_of_saves(first, without_callback, last) == [2, 8]
+    assert steps_of_saves(
+        TrainingPart([100, 100], block_length=2),
+        TrainingPart([1, 1], block_length=None),
+        TrainingPart([2, 2, 101, 101], block_length=2),
+    ) == [2, 8]
 
 
 def test_blocks_of_another_length_are_compared_anew(steps_of_saves):
-    # After a block of ten, the first pair is the best of its length, and later the third.
-    ten, pairs = Part([100] * 10, block_length=10), Part([-1, -1, -2, -2, 150, 150], block_length=2)
+    # After a block of ten, the first pair is the best one so far, and later the third.
+    ten = TrainingPart([100] * 10, block_length=10)
+    pairs = TrainingPart([-1, -1, -2, -2, 150, 150], block_length=2)
     assert steps_of_saves(ten, pairs) == [10, 10 + 2, 10 + 6]
 
 
 def test_two_callbacks_with_blocks_of_the_same_length_save_at_the_same_steps(tmp_path):
     env = ScriptedReturns(RETURNS_OF_PAIRS)
     agent = SDNNQLambda(env, inputs="all")
-    both = [BestSteps(tmp_path / name, 2) for name in ("first", "second")]
-    agent.train(env, steps=10, callbacks=both)
-    assert [best.steps for best in both] == [[2, 6, 10]] * 2
-    env = ScriptedReturns([-1, -1])
-    agent.train(env, steps=2, callbacks=both)
-    assert [best.steps[-1] for best in both] == [2, 2], "another training begins anew"
+    callbacks = [BestSteps(tmp_path / name, 2) for name in ("first", "second")]
+    agent.train(env, steps=10, callbacks=callbacks)
+    assert [callback.steps for callback in callbacks] == [[2, 6, 10]] * 2
+    agent.train(ScriptedReturns([-1, -1]), steps=2, callbacks=callbacks)
+    assert [callback.steps[-1] for callback in callbacks] == [2, 2], "another training begins anew"
 
 
 @pytest.mark.parametrize("extreme", [1e300, -1e300])
 def test_a_first_block_with_extreme_returns_is_saved(steps_of_saves, extreme):
-    saves = steps_of_saves(Part([extreme] * 2, block_length=2), Part([0, 0], block_length=2))
+    extremes, zeros = (TrainingPart([number] * 2, block_length=2) for number in (extreme, 0))
+    saves = steps_of_saves(extremes, zeros)
     assert saves == ([2] if extreme > 0 else [2, 4]), "returns of 0 are better than -1e300"
 
 
-def test_two_evaluations_without_improvement_stop_a_training(tmp_path):
+def test_two_evaluations_in_a_row_without_improvement_stop_a_training():
     stop = StopTrainingOnNoImprovement(max_evaluations=2)
     # Evaluations every 10 steps: the third and fourth are no better than the second one.
-    assert run(tmp_path, [1.0, 3.0, 2.0, 3.0, 9.0, 9.0], stop).n_steps == 40
-    assert run(tmp_path, [1.0, 3.0, 2.0, 4.0, 3.0, 5.0], stop).n_steps == 60
+    assert train_with_evaluations([1.0, 3.0, 2.0, 3.0, 9.0, 9.0], stop).n_steps == 40
+    assert train_with_evaluations([1.0, 3.0, 2.0, 4.0, 3.0, 5.0], stop).n_steps == 60
     refuses("max_evaluations", StopTrainingOnNoImprovement, 0)
 
 
 @pytest.mark.parametrize("interval", [0, -1, 2.5, None])
 def test_step_intervals_below_1_and_fractions_are_refused(trained, interval):
-    class Odd(Callback):
+    class WithBadInterval(Callback):
         step_interval = interval
 
         def on_step(self, training):
             raise AssertionError
 
     agent, env, _ = trained
-    refuses("step_interval", agent.train, env, steps=5, callbacks=[Odd()])
+    refuses("step_interval", agent.train, env, steps=5, callbacks=[WithBadInterval()])
 
 
 def test_a_training_calls_methods_replaced_on_the_instance():
