@@ -296,9 +296,7 @@ def train_with_evaluations(means, *callbacks):
 
 
 def test_save_best_agent_saves_at_each_better_evaluation(tmp_path):
-    path = tmp_path / "best.safetensors"
-
-    steps_of_files = {}
+    path, steps_of_files = tmp_path / "best.safetensors", {}
 
     class NoteNewFiles(Callback):
         def on_row(self, training, row):

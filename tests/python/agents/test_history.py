@@ -1,4 +1,7 @@
-"""States that include earlier observations."""
+"""States that include earlier observations, as "differences", "averages" or an "observer".
+
+With "auto", the end of a warm-up selects what the task needs, or "none".
+"""
 
 import gymnasium as gym
 import numpy as np
@@ -16,8 +19,7 @@ from sdnn.agents import (
 from sdnn.agents.imitation import _value
 from stopped_training import states_equal
 
-STEPS_BEYOND_WARM_UP = 1100
-"""More than the steps of a warm-up."""
+STEPS_BEYOND_WARM_UP = 1100  # a warm-up has 1,000
 
 
 def cartpole():
@@ -25,6 +27,7 @@ def cartpole():
 
 
 def cartpole_positions():
+    """CartPole without velocities: differences of observations replace them."""
     env, indices = cartpole(), [0, 2]
     space = env.observation_space
     return gym.wrappers.TransformObservation(
@@ -32,12 +35,15 @@ def cartpole_positions():
     )
 
 
-def noisy_cartpole():
-    env, random = cartpole(), np.random.default_rng(1)
-    deviation = np.array([0.24, 0.3, 0.02, 0.35])
+def noisy(env, deviations):
+    random = np.random.default_rng(1)
     return gym.wrappers.TransformObservation(
-        env, lambda x: x + deviation * random.standard_normal(4), env.observation_space
+        env, lambda x: x + random.normal(0.0, deviations), env.observation_space
     )
+
+
+def noisy_cartpole():
+    return noisy(cartpole(), [0.24, 0.3, 0.02, 0.35])
 
 
 @pytest.mark.filterwarnings("ignore:.*is not within the observation space")
@@ -51,8 +57,8 @@ def test_history_auto_selects_what_a_task_needs(agent_class, task, history):
     assert agent.history == "auto"
     agent.train(task(), steps=STEPS_BEYOND_WARM_UP, seed=1)
     assert agent.history == history
-    n_inputs = len(agent.inputs) * (2 if history == "differences" else 1)
-    assert agent.approximator.n_inputs == n_inputs
+    inputs_of_each = 2 if history == "differences" else 1  # a difference is an input, too
+    assert agent.approximator.n_inputs == len(agent.inputs) * inputs_of_each
 
 
 @pytest.mark.parametrize("agent_class", [SDNNQLambda, SDNNActorCritic])
@@ -65,7 +71,7 @@ def test_auto_finds_no_history_where_observations_show_the_state(agent_class, ta
 
 @pytest.mark.parametrize("seed", [1028, 1037])
 def test_auto_finds_no_history_in_the_task_of_the_paper(seed):
-    """Products of three variables, which the model lacks, are neither noise nor velocities."""
+    # The fitted model lacks products of three variables: its errors are no noise or velocities.
     agent = SDNNQLambda(gym.make("sdnn/PaperAcrobot-v0"), seed=seed)
     agent.train(gym.make("sdnn/PaperAcrobot-v0"), steps=STEPS_BEYOND_WARM_UP, seed=seed)
     assert agent.history == "none"
@@ -73,46 +79,37 @@ def test_auto_finds_no_history_in_the_task_of_the_paper(seed):
 
 @pytest.mark.filterwarnings("ignore:.*is not within the observation space")
 def test_an_actor_critic_that_knows_angles_finds_an_observer_for_a_noisy_pendulum():
-    def pendulum():
-        env, random = gym.make("Pendulum-v1"), np.random.default_rng(1)
-        deviation = np.array([0.1, 0.1, 0.8])
-        return gym.wrappers.TransformObservation(
-            env, lambda x: x + deviation * random.standard_normal(3), env.observation_space
-        )
+    def noisy_pendulum():
+        return noisy(gym.make("Pendulum-v1"), [0.1, 0.1, 0.8])
 
-    agent = SDNNActorCritic(pendulum(), seed=1, angle_pairs="find")
-    agent.train(pendulum(), steps=STEPS_BEYOND_WARM_UP, seed=1)
+    agent = SDNNActorCritic(noisy_pendulum(), seed=1, angle_pairs="find")
+    agent.train(noisy_pendulum(), steps=STEPS_BEYOND_WARM_UP, seed=1)
     assert (agent.history, len(agent.inputs)) == ("observer", 2)  # the angle and its velocity
 
 
 @pytest.mark.parametrize("agent_class", [SDNNQLambda, SDNNActorCritic])
 def test_without_unknown_ranges_and_inputs_history_auto_begins_no_warm_up(agent_class):
-    ranges = {"observation_range": ([-5, -5, -1, -5], [5, 5, 1, 5])}
-    agent = agent_class(cartpole(), inputs="all", angle_pairs=[], **ranges)
+    ranges = ([-5, -5, -1, -5], [5, 5, 1, 5])
+    agent = agent_class(cartpole(), inputs="all", angle_pairs=[], observation_range=ranges)
     assert (agent.is_warming_up, agent.history, agent.finds_history) == (False, "none", False)
     assert not any(name.startswith("history") for name in agent.state())
     assert agent_class(cartpole(), inputs="all", angle_pairs=[], history="observer").is_warming_up
 
 
-def test_only_general_presets_look_for_a_history_by_default():
-    def history(agent_class, **settings):
+def test_only_general_presets_without_codes_of_missing_values_find_a_history_by_default():
+    def finds_history(agent_class, **settings):
         return agent_class(gym.make("Pendulum-v1"), **settings).finds_history
 
-    assert history(SDNNQLambda)
-    assert not history(SDNNQLambda, preset="paper", observation_range="adaptive")
-    assert not history(SDNNQLambda, missing="code")
-    assert history(SDNNActorCritic, angle_pairs="find")
-    assert not history(SDNNQLearning, observation_range="adaptive")
+    assert finds_history(SDNNQLambda)
+    assert not finds_history(SDNNQLambda, preset="paper", observation_range="adaptive")
+    assert not finds_history(SDNNQLambda, missing="code")
+    assert finds_history(SDNNActorCritic, angle_pairs="find")
+    assert not finds_history(SDNNQLearning, observation_range="adaptive")
 
 
-@pytest.mark.parametrize("settings", [{}, {"inputs": "all"}])
+@pytest.mark.parametrize("settings", [{}, {"inputs": "all"}], ids=["relevant", "all inputs"])
 def test_an_agent_that_finds_no_history_learns_the_bits_of_one_without(settings):
-    """After a vain search for a history, an agent looks for inputs that matter later, as others do.
-
-    Six further inputs are noise.
-    """
-
-    def task():
+    def cartpole_with_noise_as_6_more_inputs():
         env, random = cartpole(), np.random.default_rng(1)
         high = np.concatenate([env.observation_space.high, np.ones(6, np.float32)])
         return gym.wrappers.TransformObservation(
@@ -123,8 +120,9 @@ def test_an_agent_that_finds_no_history_learns_the_bits_of_one_without(settings)
 
     states = []
     for history in ("auto", "none"):
-        agent = SDNNQLambda(task(), seed=1, history=history, **settings)
-        agent.train(task(), steps=2500, seed=1)
+        env = cartpole_with_noise_as_6_more_inputs()
+        agent = SDNNQLambda(env, seed=1, history=history, **settings)
+        agent.train(env, steps=2500, seed=1)  # relevant inputs are searched for repeatedly
         assert agent.history == "none"
         states.append({k: v for k, v in agent.state().items() if k != "history.kind"})
     assert states[0].keys() == states[1].keys()
@@ -159,32 +157,31 @@ def test_environments_of_a_vector_have_separate_histories():
     agent = SDNNQLambda(cartpole_positions(), seed=1, history="differences")
     agent.train(envs, steps=3000, seed=1)
     assert agent.history == "differences"
-    assert {name.split(".")[1] for name in agent.state() if name.startswith("last_states.")} >= {
-        "0", "1", "2",
-    }  # fmt: skip
+    prefixes = {name.rpartition(".")[0] for name in agent.state()}
+    assert prefixes >= {f"last_states.{environment}" for environment in range(3)}
 
 
 def test_the_value_after_a_truncated_episode_of_a_log_does_not_depend_on_earlier_episodes():
     agent = SDNNQLambda(cartpole_positions(), seed=1, history="differences")
     agent.train(cartpole_positions(), steps=STEPS_BEYOND_WARM_UP, seed=1)
     first, second = ([Transition([x, 0.0], 0, 1.0, [x + 0.1, 0.0], False)] for x in (-2.0, 1.0))
-    values = []
-    for earlier in ([], first):
-        agent.begin_episode()
-        for transition in earlier:
-            agent._follow_teacher(transition)
-        values.append(_value(agent, second))
-    assert values[0] == values[1]
+    agent.begin_episode()
+    value = _value(agent, second)  # of the observation after the episode
+    agent.begin_episode()
+    agent._follow_teacher(*first)
+    assert _value(agent, second) == value
 
 
-def test_an_observer_that_cannot_be_fitted_is_refused_or_warned_of():
+def test_histories_that_cannot_be_fitted_are_refused_or_warned_of():
     with pytest.raises(ValueError, match=r"history must be .* fewer than 100 warm_up_steps"):
         SDNNQLambda(cartpole(), history="observer", warm_up_steps=50)
-    many = gym.spaces.Box(-1.0, 1.0, (17,))
+    box, actions = gym.spaces.Box(-1.0, 1.0, (17,)), gym.spaces.Discrete(2)
     with pytest.raises(ValueError, match=r"history must be .* more than 16 numeric inputs"):
-        SDNNQLambda(many, gym.spaces.Discrete(2), history="observer", inputs="all", angle_pairs=[])
+        SDNNQLambda(box, actions, history="observer", inputs="all", angle_pairs=[])
     with pytest.raises(ValueError, match=r"history must be .* discrete"):
-        SDNNQLambda(gym.spaces.Discrete(5), gym.spaces.Discrete(2), history="differences")
+        SDNNQLambda(gym.spaces.Discrete(5), actions, history="differences")
+    with pytest.raises(ValueError, match="history"):
+        SDNNQLambda(cartpole(), history="auto", missing="code")
     agent = SDNNQLambda(cartpole_positions(), history="observer")
     log = [Transition([0.0, 0.1 * i], i % 2, 1.0, [0.0, 0.1], False) for i in range(20)]
     with pytest.warns(UserWarning, match="fewer than 100 transitions"):
@@ -192,22 +189,18 @@ def test_an_observer_that_cannot_be_fitted_is_refused_or_warned_of():
     assert agent.history == "none"
 
 
-def test_a_training_prints_the_history_that_was_found(invoke, tmp_path):
-    def lines(history):
-        folder = str(tmp_path / str(history))
-        options = ("--agent", "q-lambda", "--steps", "1200", "--seed", "1", "--out", folder)
-        options += () if history is None else ("--history", history)
+def test_a_training_prints_the_history_unless_its_option_is_none(invoke, tmp_path):
+    def printed_lines(*option):
+        folder = tmp_path / "_".join(option)
+        options = ("--agent", "q-lambda", "--steps", 1200, "--seed", 1, "--out", folder, *option)
         return invoke("train", "CartPole-v1", *options).output.splitlines()
 
-    assert not any(line.startswith("history") for line in lines("none"))
-    assert "history of observations in states: none, as the warm-up found" in lines("auto")
-    assert "history of observations in states: none, as the warm-up found" in lines(None)
-    assert "history of observations in states: averages" in lines("averages")
-
-
-def test_missing_codes_and_a_history_exclude_each_other():
-    with pytest.raises(ValueError, match="history"):
-        SDNNQLambda(cartpole(), history="auto", missing="code")
+    assert not any(line.startswith("history") for line in printed_lines("--history", "none"))
+    found = "history of observations in states: none, as the warm-up found"
+    assert found in printed_lines("--history", "auto")
+    assert found in printed_lines("--seed", "1"), "auto is the default"
+    averages = printed_lines("--history", "averages")
+    assert "history of observations in states: averages" in averages
 
 
 def test_an_agent_with_differences_of_a_single_relevant_input_is_saved(tmp_path):
@@ -219,11 +212,11 @@ def test_an_agent_with_differences_of_a_single_relevant_input_is_saved(tmp_path)
     observation = rng.uniform(-1.0, 1.0, 4)
     for _ in range(420):
         action = int(agent.act(observation))
-        following = rng.uniform(-1.0, 1.0, 4)  # noise, but for the first one
-        following[0] = np.clip(observation[0] + 0.2 * (2 * action - 1), -1.0, 1.0)
-        agent.learn(Transition(observation, action, following[0], following, False))
-        observation = following
-    assert [numbers for _, numbers in agent.inputs][:1] == [[0]]
+        next_observation = rng.uniform(-1.0, 1.0, 4)  # noise, except for the first variable
+        next_observation[0] = np.clip(observation[0] + 0.2 * (2 * action - 1), -1.0, 1.0)
+        agent.learn(Transition(observation, action, next_observation[0], next_observation, False))
+        observation = next_observation
+    assert agent.inputs[0][1] == [0], "the first variable is the most relevant one"
     agent.save(tmp_path / "agent")
     loaded = SDNNQLambda.load(tmp_path / "agent")
     np.testing.assert_array_equal(loaded.q_values(observation), agent.q_values(observation))

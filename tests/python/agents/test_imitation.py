@@ -23,16 +23,16 @@ from sdnn.approximators import LinearSDNNConfig
 from stopped_training import states_equal
 
 SQUARE = gym.spaces.Box(0.0, 1.0, (2,), np.float64)
-KNOWN = {"inputs": "all", "angle_pairs": "none", "observation_range": (0.0, 1.0)}
+NO_WARM_UP = {"inputs": "all", "angle_pairs": "none", "observation_range": (0.0, 1.0)}
 
 
 def cartpole_log(n_rows, seed=1, noise=0.05):
-    """Transitions of a hand-written controller, some of whose actions are random."""
+    """Return transitions of a hand-written controller; a share `noise` of its actions is random."""
     env, rng, rows = gym.make("CartPole-v1"), np.random.default_rng(seed), []
     observation, _ = env.reset(seed=seed)
     for _ in range(n_rows):
-        push = int(observation @ [0.1, 0.3, 3.0, 1.0] > 0.0)
-        action = int(rng.integers(2)) if rng.random() < noise else push
+        towards_fall = int(observation @ [0.1, 0.3, 3.0, 1.0] > 0.0)
+        action = int(rng.integers(2)) if rng.random() < noise else towards_fall
         after, reward, terminated, truncated, _ = env.step(action)
         rows.append((observation, action, reward, after, terminated, truncated))
         observation = env.reset()[0] if terminated or truncated else after
@@ -60,25 +60,26 @@ ACTIONS = [
 @pytest.mark.parametrize("space", ACTIONS, ids=lambda space: type(space).__name__)
 @pytest.mark.parametrize("reward", [0.0, 1e-9, -1000.0])
 def test_actions_of_any_space_are_imitated_at_any_size_of_rewards(agent_class, space, reward):
-    rng = np.random.default_rng(1)
+    # The teacher takes one of two actions by the first variable.
     space.seed(1)
-    choices = [space.sample() for _ in range(2)]
+    left, right = space.sample(), space.sample()
     if isinstance(space, gym.spaces.Box):
-        choices = [np.array([-1.0, 1.0]), np.array([0.0, -1.0])]
-    points = rng.uniform(size=(300, 2))
-    actions = [choices[int(x > 0.5)] for x, _ in points]
+        left, right = np.array([-1.0, 1.0]), np.array([0.0, -1.0])
+    points = np.random.default_rng(1).uniform(size=(300, 2))
+    actions = [right if x > 0.5 else left for x, _ in points]
     log = [
         Transition(point, action, reward, point, False)
         for point, action in zip(points, actions, strict=True)
     ]
-    agent = agent_class(SQUARE, space, seed=1, **KNOWN)
+    agent = agent_class(SQUARE, space, seed=1, **NO_WARM_UP)
     imitate(agent, log)
     is_clear = abs(points[:, 0] - 0.5) > 0.1
-    equal = [
-        np.allclose(agent.act(point, explore=False), action, atol=0.25)  # half a bin
+    is_imitated = [
+        # The tolerance is half a distance of the 5 actions of a box from -1 to 1.
+        np.allclose(agent.act(point, explore=False), action, atol=0.25)
         for point, action in zip(points[is_clear], np.array(actions)[is_clear], strict=True)
     ]
-    assert np.mean(equal) > 0.95
+    assert np.mean(is_imitated) > 0.95
 
 
 def value_of(agent, observation):
@@ -89,20 +90,21 @@ def value_of(agent, observation):
 
 @pytest.mark.parametrize("agent_class", [SDNNQLambda, SDNNActorCritic])
 def test_values_after_imitation_are_the_returns_of_the_teacher(agent_class):
-    # Two steps to a reward of 8 with a discount of 1/2; a truncated episode bootstraps.
     a, b = [0.2, 0.2], [0.8, 0.8]
-    learning = agent_class.learning_type(discount=0.5)
-    push = gym.spaces.Discrete(2)
-    whole, truncated = (agent_class(SQUARE, push, learning=learning, **KNOWN) for _ in range(2))
-    ended = [Transition(a, 0, 0.0, b, False), Transition(b, 1, 8.0, b, True)]
-    imitate(whole, ended, epochs=200)
-    assert [value_of(whole, x) for x in (b, a)] == pytest.approx([8.0, 4.0], abs=0.2)
-    imitate(truncated, [(b, 1, 3.0, b, False, True)], epochs=400)  # v = 3 + v / 2
-    assert value_of(truncated, b) == pytest.approx(6.0, abs=0.2)
+    learning, actions = agent_class.learning_type(discount=0.5), gym.spaces.Discrete(2)
+    agent, other = (agent_class(SQUARE, actions, learning=learning, **NO_WARM_UP) for _ in range(2))
+    # An episode of two steps with a reward of 8 at its end.
+    terminated = [Transition(a, 0, 0.0, b, False), Transition(b, 1, 8.0, b, True)]
+    imitate(agent, terminated, epochs=200)
+    assert value_of(agent, a) == pytest.approx(0.5 * 8.0, abs=0.2)
+    assert value_of(agent, b) == pytest.approx(8.0, abs=0.2)
+    # A truncated episode bootstraps from its last observation: v = 3 + 0.5 v = 6.
+    imitate(other, [(b, 1, 3.0, b, False, True)], epochs=400)
+    assert value_of(other, b) == pytest.approx(6.0, abs=0.2)
 
 
 @pytest.mark.parametrize("n_rows", [1, 2, 40, 300])
-def test_unknown_ranges_are_fitted_to_the_log(n_rows):
+def test_unknown_ranges_are_fitted_to_logs_shorter_and_longer_than_a_warm_up(n_rows):
     space = gym.spaces.Box(-np.inf, np.inf, (2,), np.float64)
     agent = SDNNQLambda(space, gym.spaces.Discrete(2), warm_up_steps=200, seed=1)
     points = np.random.default_rng(1).uniform(2.0, 4.0, (n_rows, 2))
@@ -110,7 +112,7 @@ def test_unknown_ranges_are_fitted_to_the_log(n_rows):
     rows = [Transition(point, int(point[0] > 3.0), 0.0, point, True) for point in points]
     assert imitate(agent, rows, epochs=3) == 3 * n_rows
     low, high = agent.observation_range
-    if n_rows == 40:  # few: the range of 2 to 4 is widened by twice its width at both ends
+    if n_rows == 40:  # a short log: the range of 2 to 4 is widened by twice its width on both sides
         np.testing.assert_allclose(low, -2.0)
         np.testing.assert_allclose(high, 8.0)
     assert agent.act([4.0, 4.0], explore=False) == 1
@@ -143,34 +145,35 @@ def test_imitation_of_rows_columns_and_a_loaded_agent_have_the_same_bits(agent_c
     assert states_equal(agent, saved)
 
 
-def imitated(slow, x, action, value, margin):
-    """`QLambda::imitate` in NumPy."""
+def imitate_in_numpy(slow, x, action, value, margin):
+    """Learn an action's value, and a margin to the best other one, as `QLambda::imitate`."""
     slow.fit_unit(value)
     slow.fit_unit(margin)
     slow.n_learned += 1
     s = slow.settings
     rate = max(1, slow.scheduled(s.learning_rate, s.final_learning_rate))
-    while abs(slow.value(x, action)) >= 2**33:
+    while abs(slow.value(x, action)) >= 2**33:  # values stay below 2^33 units
         slow.double_unit()
     error = slow.units_of(value) - slow.value(x, action)
-    move(slow, x, np.full(len(slow.weights), error), rate, action)
+    move_in_numpy(slow, x, np.full(len(slow.weights), error), rate, action)
     errors = np.zeros(len(slow.weights), np.int64)
-    for d, part in enumerate(slow.sums(x, slow.weights)):
-        others = np.delete(np.arange(len(part)), action[d])
+    for dimension, values in enumerate(slow.sums(x, slow.weights)):
+        taken = action[dimension]
+        others = np.delete(np.arange(len(values)), taken)
         if len(others) == 0:
             continue
-        best = others[np.argmax(part[others])]
-        error = int(part[best]) + slow.units_of(margin) - int(part[action[d]])
+        best = others[np.argmax(values[others])]
+        error = int(values[best]) + slow.units_of(margin) - int(values[taken])
         if error > 0:
             half = error * len(action) // 2
-            rows = slow.first_rows[d] + np.arange(slow.window)
-            np.add.at(errors, rows + action[d], half)
+            rows = slow.first_rows[dimension] + np.arange(slow.window)
+            np.add.at(errors, rows + taken, half)
             np.add.at(errors, rows + best, -half)
-    move(slow, x, errors, 2**16 // 10, action)
+    move_in_numpy(slow, x, errors, 2**16 // 10, action)  # a rate of 0.1 in units of 2^-16
 
 
-def move(slow, x, errors, rate, action):
-    """`LinearSDNN::move_rows` in NumPy."""
+def move_in_numpy(slow, x, errors, rate, action):
+    """Move weights by errors of their rows, in fixed point as `LinearSDNN::move_rows`."""
     part = (rate << 12) // max(1, np.count_nonzero(x) * len(slow.rows(action)))
     steps = [((int(np.clip(e, 1 - 2**34, 2**34 - 1)) * part + 2**27) >> 28) for e in errors]
     largest = max(map(abs, steps))
@@ -202,30 +205,29 @@ def test_weights_after_imitation_are_those_of_the_numpy_transcription(
         approximator=LinearSDNNConfig(**SMALL, action_window=window, n_actions=n_actions),
         learning=QLambdaConfig(schedule_steps=7),
         seed=seed,
-        **KNOWN,
+        **NO_WARM_UP,
     )
     sizes = [n_actions] * n_dimensions
     slow, margin = QLambda(Code(agent.readout.code, 2), sizes, window, learning), 0.1 * scale
     for state, action, value, _, _ in random_transitions(seed, 25, sizes, scale):
         torques = np.array(action) / (n_actions - 1)
         agent._imitate_step(Transition(state, torques, 0.0, state, True), value, margin)
-        imitated(slow, slow.code(state), action, value, margin)
+        imitate_in_numpy(slow, slow.code(state), action, value, margin)
         assert agent.readout.exponent == slow.exponent
         np.testing.assert_array_equal(agent.readout.weights(), slow.weights)
 
 
 def test_wrong_agents_actions_and_datasets_are_refused_and_change_nothing():
-    push = gym.spaces.Discrete(2)
-    agent = SDNNQLambda(SQUARE, push, seed=1, **KNOWN)
+    actions = gym.spaces.Discrete(2)
+    agent = SDNNQLambda(SQUARE, actions, seed=1, **NO_WARM_UP)
     row = Transition([0.1, 0.1], 1, 0.0, [0.2, 0.2], True)
     assert imitate(agent, []) == 0
     unchanged = copy.deepcopy(agent)
-    bad = [row, row._replace(action=2)]
-    error = refuses("action", imitate, agent, bad)
+    error = refuses("action", imitate, agent, [row, row._replace(action=2)])
     assert "episode 1, transition 1" in str(error)
-    refuses("agent", imitate, RBFQLearning(SQUARE, push), [row], error=TypeError)
+    refuses("agent", imitate, RBFQLearning(SQUARE, actions), [row], error=TypeError)
     torque = gym.spaces.Box(-1.0, 1.0, (1,))
     refuses("agent", imitate, FuzzyQLearning(SQUARE, torque), [row], error=TypeError)
     assert states_equal(agent, unchanged)
     with pytest.raises(RuntimeError, match="warming up"):
-        SDNNQLambda(SQUARE, push, warm_up_steps=9)._imitate_step(row, 0.0, 1.0)
+        SDNNQLambda(SQUARE, actions, warm_up_steps=9)._imitate_step(row, 0.0, 1.0)
