@@ -13,7 +13,7 @@ from sdnn.environments.spaces import Observations
 BOX = gym.spaces.Box(np.array([-1.0, 0.0]), np.array([3.0, 10.0]), dtype=np.float64)
 UNBOUNDED = gym.spaces.Box(-np.inf, np.inf, (3,), dtype=np.float64)
 SMALL = SDNNCConfig(n_pattern_units=20, n_hidden_units=60, n_active_units=20)
-BUTTONS = gym.spaces.Discrete(2)
+ACTIONS = gym.spaces.Discrete(2)
 
 
 def config(space, ranges=None, angles=(), angle_pairs="none"):
@@ -21,14 +21,14 @@ def config(space, ranges=None, angles=(), angle_pairs="none"):
 
 
 def sdnn_agent(space, **options):
-    return SDNNQLearning(space, BUTTONS, approximator=SMALL, **options)
+    return SDNNQLearning(space, ACTIONS, approximator=SMALL, **options)
 
 
 def inputs(space, **options):
     return sdnn_agent(space, **options).inputs
 
 
-def test_ranges_are_the_bounds_of_the_space_unless_others_are_set():
+def test_ranges_are_the_bounds_of_the_space_unless_other_ranges_are_passed():
     agent = sdnn_agent(BOX)
     assert not agent.is_warming_up
     lowest, highest = BOX.low.tolist(), BOX.high.tolist()
@@ -38,12 +38,12 @@ def test_ranges_are_the_bounds_of_the_space_unless_others_are_set():
 
 
 def test_a_warm_up_fits_ranges_and_finds_angle_pairs():
-    agent = RBFQLearning(UNBOUNDED, BUTTONS, angle_pairs="find", warm_up_steps=40)
+    agent = RBFQLearning(UNBOUNDED, ACTIONS, angle_pairs="find", warm_up_steps=40)
     with pytest.raises(RuntimeError, match="warm"):
         _ = agent.observation_range
     for turn in np.linspace(0, 5, 40):
-        here = [np.cos(turn), np.sin(turn), 4.0 * turn / 5]
-        agent.learn(Transition(here, 1, 0.0, here, False))
+        observation = [np.cos(turn), np.sin(turn), 4.0 * turn / 5]
+        agent.learn(Transition(observation, 1, 0.0, observation, False))
     low, high = agent.observation_range
     # The third variable was in 0 to 4, which is widened by a quarter at either end.
     assert (low.tolist(), high.tolist()) == ([-1.0, -1.0, -1.0], [1.0, 1.0, 5.0])
@@ -58,32 +58,38 @@ def test_a_bound_at_the_largest_float_is_unbounded():
 @pytest.mark.parametrize("dtype", [np.int32, np.int64])
 def test_infinite_bounds_of_integer_boxes_are_unbounded(dtype):
     box = gym.spaces.Box
-    parts = {"up": box(0, np.inf, (1,), dtype), "all": box(-np.inf, np.inf, (2,), dtype)}
-    space = gym.spaces.Dict({**parts, "byte": box(0, 255, (1,), np.uint8)})
-    low, high = flat_bounds(space)  # in the order of their names
+    space = gym.spaces.Dict(
+        a=box(-np.inf, np.inf, (2,), dtype),
+        b=box(0, 255, (1,), np.uint8),
+        c=box(0, np.inf, (1,), dtype),
+    )
+    low, high = flat_bounds(space)
     assert low.tolist() == [-np.inf, -np.inf, 0.0, 0.0]
     assert high.tolist() == [np.inf, np.inf, 255.0, np.inf]
     assert config(space).high == (None, None, 255.0, None)
+
+
+def test_the_largest_integer_is_a_bound_with_16_bits_but_none_with_32():
+    box = gym.spaces.Box
     assert flat_bounds(box(np.int16(-32768), np.int16(32767), (1,), np.int16))[1] == [32767.0]
-    most = np.iinfo(np.uint32).max
-    low, high = flat_bounds(box(0, most, (1,), np.uint32))
+    low, high = flat_bounds(box(0, np.iinfo(np.uint32).max, (1,), np.uint32))
     assert (low, high) == ([0.0], [np.inf])
 
 
-def test_lower_and_upper_bounds_are_unknown_separately():
-    half = gym.spaces.Box(np.array([-np.inf, 0.0]), np.array([1.0, 1.0]), dtype=np.float64)
-    settings = config(half)
+def test_a_lower_bound_may_be_unknown_where_the_upper_one_is_known_and_the_other_way_round():
+    half_bounded = gym.spaces.Box(np.array([-np.inf, 0.0]), np.array([1.0, 1.0]), dtype=np.float64)
+    settings = config(half_bounded)
     assert (settings.low, settings.high) == ((None, 0.0), (None, 1.0))
     settings = config(UNBOUNDED, ([0.0, np.nan, -1.0], 2.0))
     assert (settings.low, settings.high) == ((0.0, None, -1.0), (2.0, None, 2.0))
 
 
-def test_the_learning_report_shows_the_shares_of_ranges_in_use():
+def test_the_learning_report_shows_the_share_of_each_range_that_was_observed():
     space = gym.spaces.Dict({"at": gym.spaces.Box(0, 1, (1,)), "room": gym.spaces.Discrete(3)})
     agent = sdnn_agent(space)
     for t in range(400):
-        here = {"at": [t % 9 / 9], "room": t % 3}
-        agent.learn(Transition(here, 0, 0.0, here, False))
+        observation = {"at": [t % 9 / 9], "room": t % 3}
+        agent.learn(Transition(observation, 0, 0.0, observation, False))
     # "at" has the values 0, 1/9 ... 8/9 of the range from 0 to 1; a discrete "room" has no range.
     report = agent.learning_report()
     assert report["share_of_range"][0] > 0.7
@@ -91,7 +97,7 @@ def test_the_learning_report_shows_the_shares_of_ranges_in_use():
     assert report["share_of_range"][1:] == [None] * 3
 
 
-GEAR = gym.spaces.Dict(
+NESTED = gym.spaces.Dict(
     {
         "speed": gym.spaces.Box(-2, 2, (2,), np.float64),
         "gear": gym.spaces.Discrete(3, start=-1),
@@ -101,9 +107,9 @@ GEAR = gym.spaces.Dict(
 
 
 def test_each_discrete_part_is_one_symbol_input_where_symbols_are_coded():
-    agent = SDNNQLearning(GEAR, BUTTONS, approximator=SMALL)
-    # A variable has its number, a symbol the first of its flattened variables and how many they
-    # are. Gymnasium sorts the names of a Dict.
+    agent = SDNNQLearning(NESTED, ACTIONS, approximator=SMALL)
+    # A variable has its index in the flattened observation, a symbol the first index and the number
+    # of its values. Gymnasium sorts the names of a Dict.
     assert agent.inputs == [
         ("symbol", [0, 3]),
         ("variable", [3]),
@@ -113,8 +119,9 @@ def test_each_discrete_part_is_one_symbol_input_where_symbols_are_coded():
         ("variable", [12]),
     ]
     assert agent.approximator.n_symbols == (3, 0, 0, 2, 5, 0)
-    small = gym.spaces.Dict({"speed": GEAR["speed"], "gear": GEAR["gear"]})
-    assert RBFQLearning(small, BUTTONS).inputs == [("variable", [i]) for i in range(5)]
+    # RBF networks have no symbols: gears are three variables beside two of speed.
+    space = gym.spaces.Dict({"speed": NESTED["speed"], "gear": NESTED["gear"]})
+    assert RBFQLearning(space, ACTIONS).inputs == [("variable", [i]) for i in range(5)]
 
 
 def test_a_single_input_is_repeated_where_two_are_needed():
@@ -131,8 +138,8 @@ def test_angle_pairs_and_angles_are_circular_inputs():
 
 
 def test_variables_of_discrete_spaces_cannot_be_angles():
-    refuses("angles", sdnn_agent, GEAR, angles=[1])
-    refuses("angle_pairs", sdnn_agent, GEAR, angle_pairs=[(4, 5)])
+    refuses("angles", sdnn_agent, NESTED, angles=[1])
+    refuses("angle_pairs", sdnn_agent, NESTED, angle_pairs=[(4, 5)])
 
 
 @pytest.mark.parametrize(
@@ -179,8 +186,8 @@ def test_observations_of_another_space_are_refused_by_name(space, observation):
     refuses("next_observation", Observations(space).vector, "next_observation", observation)
 
 
-class _Distracted(gym.ObservationWrapper):
-    """CartPole with slow noise beside what it observes."""
+class CartPoleWithNoise(gym.ObservationWrapper):
+    """CartPole with further variables of autocorrelated noise."""
 
     def __init__(self, env, n_noise):
         super().__init__(env)
@@ -193,7 +200,7 @@ class _Distracted(gym.ObservationWrapper):
 
 
 def test_irrelevant_inputs_are_left_out_also_after_loading(tmp_path):
-    env = _Distracted(gym.make("CartPole-v1"), 6)
+    env = CartPoleWithNoise(gym.make("CartPole-v1"), 6)
     agent = SDNNQLearning(
         env.observation_space, env.action_space, preset="small", seed=1, inputs="relevant"
     )
@@ -210,7 +217,7 @@ def test_irrelevant_inputs_are_left_out_also_after_loading(tmp_path):
 
 
 def test_listed_inputs_are_kept_although_irrelevant():
-    env = _Distracted(gym.make("CartPole-v1"), 6)
+    env = CartPoleWithNoise(gym.make("CartPole-v1"), 6)
     agent = sdnn_agent(env.observation_space, inputs=[9, 6])
     agent.train(env, steps=1001, seed=1)  # inputs are chosen after a warm-up of 1,000
     chosen = [variables[0] for _, variables in agent.inputs]

@@ -1,4 +1,8 @@
-"""Q(lambda) with a linear readout: its NumPy transcription, learning, and inputs."""
+"""Q(lambda) with a linear readout: its NumPy transcription, learning, and inputs.
+
+After 2,000 steps of an episode a fourth of the explorations are excursions: worst actions for some
+steps, which are not learned.
+"""
 
 import copy
 
@@ -24,12 +28,13 @@ from stopped_training import states_equal
     discount=st.sampled_from([0.0, 0.9, 1.0]),
     learning_rate=st.sampled_from([1e-6, 0.3, 1.0]),
     scale=st.sampled_from([1.0, 100.0, 1e6, 1e-40]),
-    usual=st.booleans(),
+    durations_are_1=st.booleans(),
 )
 @settings(max_examples=60, deadline=None)
 def test_weights_are_those_of_the_numpy_transcription(
-    seed, n_actions, window, bootstrap, traces, trace_decay, discount, learning_rate, scale, usual
-):
+    seed, n_actions, window, bootstrap, traces, trace_decay, discount, learning_rate, scale,
+    durations_are_1,
+):  # fmt: skip
     learning = {
         "learning_rate": learning_rate,
         "final_learning_rate": 0.01,
@@ -49,10 +54,10 @@ def test_weights_are_those_of_the_numpy_transcription(
     )
     (readout,) = agent.networks
     transcription = QLambda(Code(readout.code, 2), n_actions, window, learning)
-    durations = random_durations(seed, usual)
+    durations = random_durations(seed, durations_are_1)
     for state, action, reward, next_state, end in random_transitions(seed, 25, n_actions, scale):
         dt = next(durations)
-        # Acting keeps sums for learning.
+        # The agent keeps sums of weights for learning when it acts.
         x = transcription.code(state)
         best = [int(index) for index in agent.act(state)]
         assert transcription.value(x, best) == transcription.best_value(x)
@@ -74,28 +79,27 @@ def test_excursions_of_an_endless_episode_are_those_of_the_numpy_transcription()
         seed=1,
     )
     options = {"bootstrap": "q_learning", "traces": "dutch", "seed": 1} | learning
-    page = QLambda(Code(agent.networks[0].code, 2), n_actions, 1, options)
+    slow = QLambda(Code(agent.networks[0].code, 2), n_actions, 1, options)
     rng, n_excursions = np.random.default_rng(0), 0
     state = rng.random(2)
     for _ in range(3000):
         action = [int(index) for index in agent.act(state)]
-        assert action == [int(index) for index in page.act(state)]
-        n_excursions += page.is_excursion
+        assert action == [int(index) for index in slow.act(state)]
+        n_excursions += slow.is_excursion
         reward, next_state = rng.normal(), rng.random(2)
-        for learner in (agent, page):
+        for learner in (agent, slow):
             learner.learn(state, action, reward, next_state, False, 1.0)
         state = next_state
-    assert 100 < n_excursions < 900  # of 1,000 steps
+    assert 100 < n_excursions < 900  # steps of the last 1,000
 
 
-def excursions_of(agent):
-    """The names of what is saved of excursions."""
+def saved_excursions(agent):
+    """Return the names of arrays about excursions: none unless an environment is in one."""
     return [name for name in agent.state() if name.endswith(("is_excursion", "skips_learning"))]
 
 
-@pytest.mark.parametrize("when", ["before learning", "after learning"])
-def test_excursions_resume_exactly_and_take_allowed_actions(when, tmp_path):
-    # Two environments, with masks at random.
+@pytest.mark.parametrize("when_saved", ["before learning", "after learning"])
+def test_excursions_resume_exactly_and_take_allowed_actions(when_saved, tmp_path):
     def new_agent():
         space = gym.spaces.Box(-1.0, 1.0, (2,))
         learning = QLambdaConfig(epsilon=0.5)
@@ -108,58 +112,62 @@ def test_excursions_resume_exactly_and_take_allowed_actions(when, tmp_path):
     def run_with_saves(agent, saved_steps):
         n_in_excursions = 0
         for step in range(4400):
-            rng, i = np.random.default_rng(step), step % 2
+            rng, environment = np.random.default_rng(step), step % 2
             observation, next_observation = rng.uniform(-1, 1, (2, 2))
+            # Two of 3 actions of the first dimension, and both of the second one.
             mask = np.append(rng.permutation([1, 1, 0]), [1, 1]).astype(np.int8)
-            action = agent.act(observation, environment=i, mask=mask)
+            action = agent.act(observation, environment=environment, mask=mask)
             assert mask[action[0]]
             transition = Transition(observation, action, rng.normal(), next_observation, False)
-            if when == "after learning":
-                agent.learn(transition, environment=i)
+            if when_saved == "after learning":
+                agent.learn(transition, environment=environment)
             if step in saved_steps:
-                n_in_excursions += len(excursions_of(agent)) > 0
+                n_in_excursions += len(saved_excursions(agent)) > 0
                 agent.save(tmp_path / "agent.safetensors")
                 agent = load_agent(tmp_path / "agent.safetensors")
-            if when == "before learning":
-                agent.learn(transition, environment=i)
+            if when_saved == "before learning":
+                agent.learn(transition, environment=environment)
         return agent, n_in_excursions
 
+    # From step 4,000 on, both environments have excursions.
     resumed, n_in_excursions = run_with_saves(new_agent(), range(4200, 4400, 10))
     assert n_in_excursions > 3
     assert states_equal(run_with_saves(new_agent(), ())[0], resumed)
 
 
-def test_a_step_that_the_agent_did_not_take_is_learned_after_an_excursion():
-    agent = SDNNQLambda(
+def agent_with_excursions():
+    return SDNNQLambda(
         gym.spaces.Box(-1.0, 1.0, (2,)), gym.spaces.Discrete(2), seed=1,
         learning=QLambdaConfig(epsilon=0.5), warm_up_steps=50,
     )  # fmt: skip
+
+
+def test_transitions_that_the_agent_did_not_act_in_are_learned_after_an_excursion():
+    agent = agent_with_excursions()
     rng = np.random.default_rng(0)
     for _ in range(2100):
         observation, next_observation = rng.uniform(-1, 1, (2, 2))
         action = agent.act(observation)
         agent.learn(Transition(observation, action, rng.normal(), next_observation, False))
-    while not excursions_of(agent):
+    while not saved_excursions(agent):
         action = agent.act(observation)
     agent.learn(Transition(observation, action, 1.0, next_observation, False))
-    for other in (0, 1):
+    for action in (0, 1):
         before = agent.readout.weights()
-        agent.learn(Transition(observation, other, 5.0, next_observation, False))
+        agent.learn(Transition(observation, action, 5.0, next_observation, False))
         assert (agent.readout.weights() != before).any()
 
 
-def test_steps_of_excursions_do_not_count_as_learned(tmp_path):
-    agent = SDNNQLambda(
-        gym.spaces.Box(-1.0, 1.0, (2,)), gym.spaces.Discrete(2), seed=1,
-        learning=QLambdaConfig(epsilon=0.5), warm_up_steps=50,
-    )  # fmt: skip
+def test_steps_of_excursions_neither_change_weights_nor_count_as_learned(tmp_path):
+    agent = agent_with_excursions()
     rng, n_steps, n_left_out = np.random.default_rng(0), 2500, 0
     for step in range(n_steps):
         observation, next_observation = rng.uniform(-1, 1, (2, 2))
         action = agent.act(observation)
-        before = None if step < 2000 else agent.readout.weights()
+        before = None if agent.is_warming_up else agent.readout.weights()
         agent.learn(Transition(observation, action, rng.normal(), next_observation, False))
-        n_left_out += before is not None and np.array_equal(agent.readout.weights(), before)
+        if step >= 2000 and np.array_equal(agent.readout.weights(), before):
+            n_left_out += 1
     assert n_left_out > 50
     assert agent.n_learned == n_steps - n_left_out
     agent.save(tmp_path / "agent.safetensors")
@@ -179,12 +187,12 @@ def test_a_few_discrete_states_have_exact_independent_values(tmp_path):
 
 
 @pytest.mark.parametrize(("n_states", "n_units"), [(1, 0), (2000, 0), (5, 40)])
-def test_many_discrete_states_or_explicit_units_are_coded_as_patterns(n_states, n_units):
+def test_a_single_or_many_states_or_a_set_number_of_units_are_coded_as_patterns(n_states, n_units):
     agent = SDNNQLambda(
         gym.spaces.Discrete(n_states), gym.spaces.Discrete(2), seed=1,
         approximator=LinearSDNNConfig(n_pattern_units=n_units),
     )  # fmt: skip
-    assert agent.approximator.n_pattern_units == (n_units or 768)
+    assert agent.approximator.n_pattern_units == (n_units or 768)  # the default
     agent.learn(Transition(0, 1, 2.0, 0, terminated=True))
     assert agent.q_values(0)[1] == pytest.approx(2, rel=1e-3)
 
@@ -192,7 +200,7 @@ def test_many_discrete_states_or_explicit_units_are_coded_as_patterns(n_states, 
 @pytest.mark.parametrize(
     ("n_inputs", "n_units"), [(1, 768), (2, 768), (3, 512), (4, 256), (8, 256), (11, 128), (17, 64)]
 )
-def test_the_default_number_of_pattern_units_falls_with_the_inputs(n_inputs, n_units):
+def test_the_default_number_of_pattern_units_decreases_with_the_inputs(n_inputs, n_units):
     space = gym.spaces.Box(-1.0, 1.0, (n_inputs,), np.float64)
     agent = SDNNQLambda(space, gym.spaces.Discrete(2), inputs="all", angle_pairs="none")
     assert agent.approximator.n_pattern_units == n_units
@@ -212,7 +220,7 @@ def test_values_scale_exactly_with_rewards(scale):
     np.testing.assert_array_equal(values(factor), values(1.0) * factor)
 
 
-def test_values_recover_from_an_outlier_reward_within_their_resolution():
+def test_values_recover_from_an_outlier_reward():
     agent = _core.BareAgent(
         approximator=LinearSDNNConfig(n_inputs=2),
         n_actions=[2],
@@ -222,6 +230,7 @@ def test_values_recover_from_an_outlier_reward_within_their_resolution():
     agent.learn([0.1, 0.1], [0], -1e6, [0.2, 0.1], True)
     for _ in range(30):
         agent.learn([0.1, 0.1], [0], 1.0, [0.2, 0.1], True)
+    # The resolution stays that of values of a million.
     assert agent.networks[0].values([0.1, 0.1])[0] == pytest.approx(1.0, abs=0.5)
 
 
@@ -258,63 +267,65 @@ N_WARM_UP = 400
 
 
 def changing_task(seed, n_steps):
-    """Yield transitions of a position that actions move, three noise variables, and a last
-    variable that is rewarded after the steps of a warm-up.
+    """Yield transitions of a position that actions move and four variables of noise.
+
+    After the steps of a warm-up, the last variable is rewarded, too.
     """
     rng = np.random.default_rng(seed)
     observation = rng.random(5)
     for t in range(n_steps):
         action = int(rng.integers(3))
-        place = np.clip(observation[0] + 0.1 * (action - 1), 0.0, 1.0)
+        position = np.clip(observation[0] + 0.1 * (action - 1), 0.0, 1.0)
         reward = abs(observation[0] - 0.5) + (5.0 * observation[4] if t >= N_WARM_UP else 0.0)
-        next_observation = np.array([place, *rng.random(4)])
+        next_observation = np.array([position, *rng.random(4)])
         yield Transition(observation, action, reward, next_observation, False)
         observation = next_observation
 
 
 @pytest.mark.parametrize("inputs", [[2], [1, 3]])
-def test_inputs_that_become_relevant_later_are_added(inputs, tmp_path):
+def test_inputs_that_become_relevant_later_are_added_also_after_loading(inputs, tmp_path):
     unit, three = gym.spaces.Box(0.0, 1.0, (5,), np.float64), gym.spaces.Discrete(3)
     agent = SDNNQLambda(
         unit, three, angle_pairs="none", inputs=inputs, warm_up_steps=N_WARM_UP, seed=2
     )
     agent.n_environments = 2
-    same, probe = copy.deepcopy(agent), np.full(5, 0.3)
-    numbers = []
-    for t, transition in enumerate(changing_task(1, 1700)):
-        agent.learn(transition, environment=t // 2 % 2)
-        same.learn(transition, environment=t // 2 % 2)
-        if t % 170 == 20:  # during the warm-up, while transitions are remembered, and later
-            same.save(tmp_path / "agent.safetensors")
-            same = load_agent(tmp_path / "agent.safetensors")
+    resumed, observation = copy.deepcopy(agent), np.full(5, 0.3)
+    inputs_after = {}  # by the number of steps
+    for n_steps, transition in enumerate(changing_task(1, 1700), start=1):
+        for learner in (agent, resumed):
+            learner.learn(transition, environment=n_steps // 2 % 2)
+        if n_steps % 170 == 20:  # during the warm-up, while transitions are remembered, and later
+            resumed.save(tmp_path / "agent.safetensors")
+            resumed = load_agent(tmp_path / "agent.safetensors")
         if agent.is_warming_up:
             continue
-        assert np.array_equal(agent.q_values(probe), same.q_values(probe))
-        if len(agent.inputs) not in numbers:
-            numbers.append(len(agent.inputs))
-            left_out = agent.learning_report()["left_out"]
-            assert len(left_out) + len(agent.inputs) == 5
-            assert (4 in left_out) == (t + 1 == N_WARM_UP)
-            assert t + 1 in (N_WARM_UP, 2 * N_WARM_UP)
-    assert len(numbers) == 2
-    assert ("variable", [4]) in agent.inputs[numbers[0] :]
-    assert agent.approximator.n_inputs == numbers[1]
-    assert states_equal(same, agent)
-    assert not np.array_equal(agent.q_values(probe), agent.q_values([0.3, 0.3, 0.3, 0.3, 0.9]))
+        assert np.array_equal(agent.q_values(observation), resumed.q_values(observation))
+        left_out = agent.learning_report()["left_out"]
+        assert len(left_out) + len(agent.inputs) == 5
+        if agent.inputs not in inputs_after.values():
+            inputs_after[n_steps] = agent.inputs
+    assert list(inputs_after) == [N_WARM_UP, 2 * N_WARM_UP]
+    chosen, with_added = inputs_after.values()
+    assert ("variable", [4]) not in chosen
+    assert ("variable", [4]) in with_added[len(chosen) :]
+    assert agent.approximator.n_inputs == len(with_added)
+    assert states_equal(resumed, agent)
+    other_observation = [0.3, 0.3, 0.3, 0.3, 0.9]
+    assert not np.array_equal(agent.q_values(observation), agent.q_values(other_observation))
 
 
-def test_a_network_without_linear_readout_keeps_the_inputs_of_its_warm_up():
+def test_an_rbf_network_keeps_the_inputs_that_its_warm_up_chose():
     unit, three = gym.spaces.Box(0.0, 1.0, (5,), np.float64), gym.spaces.Discrete(3)
     agent = RBFQLearning(unit, three, inputs=[2], warm_up_steps=N_WARM_UP)
     for t, transition in enumerate(changing_task(1, 850)):
         agent.learn(transition)
         if t == N_WARM_UP:
-            inputs = agent.inputs
-    assert agent.inputs == inputs
+            chosen = agent.inputs
+    assert agent.inputs == chosen
     assert 4 in agent.learning_report()["left_out"]
 
 
-def test_an_outlier_reward_is_not_learned_and_keeps_the_reported_unit():
+def test_an_outlier_reward_is_not_learned_and_does_not_change_the_unit_of_values():
     agent, without_outlier = (
         SDNNQLambda(gym.spaces.Discrete(2), gym.spaces.Discrete(2)) for _ in range(2)
     )

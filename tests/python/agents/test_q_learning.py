@@ -5,7 +5,7 @@ import dataclasses
 import gymnasium as gym
 import numpy as np
 import pytest
-import sdnn_q_learning as page
+import sdnn_q_learning as transcription
 
 from refusals import refuses
 from sdnn import _core
@@ -16,7 +16,7 @@ from sdnn.coding import Circular
 SMALL = SDNNCConfig(n_pattern_units=40, n_hidden_units=120, n_active_units=30)
 OBSERVATIONS = gym.spaces.Box(-2.0, 2.0, (3,), np.float64)
 TORQUES = gym.spaces.Box(-1.0, 3.0, (1,), np.float32)
-BUTTONS = gym.spaces.Discrete(4, start=2)
+FOUR_ACTIONS = gym.spaces.Discrete(4, start=2)
 
 
 def small_agent(actions=TORQUES, **options):
@@ -32,11 +32,11 @@ OTHER_RATES = {"learning_rate": 0.3, "discount": 0.99, "epsilon": 0.5, "n_greedy
 )
 def test_the_numpy_transcription_and_the_core_learn_the_same_trial(n_inputs, noise, learning):
     n_episodes = 15 if n_inputs == 4 else 8
-    settings = page.Settings(
+    settings = transcription.Settings(
         episodes=n_episodes, seed=7, n_inputs=n_inputs, noise=noise, **learning
     )
     lines = []
-    network = page.train(settings, lines.append).network
+    expected = transcription.train(settings, lines.append).network
     trial = _core.AcrobotTrial(
         approximator=_core.SDNNCConfig(n_inputs=n_inputs),
         learning=_core.QLearningConfig(**learning),
@@ -53,18 +53,18 @@ def test_the_numpy_transcription_and_the_core_learn_the_same_trial(n_inputs, noi
         steps.append(trial.n_decisions - before)
     # Printed lines are "episode 1: 50 steps, ...".
     assert [int(line.split()[2]) for line in lines] == steps
-    core = trial.agent.networks[0]
-    assert np.array_equal(core.weights(), network.weights)
-    assert np.array_equal(core.thresholds(), network.thresholds)
-    assert np.abs(core.weights()).max() > 5, "something was learned"
+    network = trial.agent.networks[0]
+    assert np.array_equal(network.weights(), expected.weights)
+    assert np.array_equal(network.thresholds(), expected.thresholds)
+    assert np.abs(network.weights()).max() > 5, "something was learned"
 
 
-def test_the_number_of_actions_is_that_of_windows_or_of_a_discrete_space():
+def test_the_number_of_actions_is_that_of_windows_of_units_or_of_a_discrete_space():
     agent = small_agent()
     n_windows = SMALL.n_hidden_units - SMALL.n_active_units + 1
     assert agent.approximator == dataclasses.replace(SMALL, n_inputs=3, n_actions=n_windows)
     assert agent.networks[0].n_actions == n_windows
-    agent = small_agent(BUTTONS)
+    agent = small_agent(FOUR_ACTIONS)
     assert agent.approximator == dataclasses.replace(SMALL, n_inputs=3, n_actions=4)
 
 
@@ -87,7 +87,7 @@ def test_presets_are_used_unless_settings_are_passed():
 
 
 def test_an_agent_of_a_discrete_space_learns_and_takes_its_best_action():
-    agent = small_agent(BUTTONS, seed=2, learning=QLearningConfig(tie_rule="lowest"))
+    agent = small_agent(FOUR_ACTIONS, seed=2, learning=QLearningConfig(tie_rule="lowest"))
     assert agent.n_actions == 4
     assert agent.actions.tolist() == [2, 3, 4, 5]
     observation = [0.5, -0.5, 0.0]
@@ -96,7 +96,7 @@ def test_an_agent_of_a_discrete_space_learns_and_takes_its_best_action():
     assert agent.q_values(observation).argmax() == 2
     action = agent.act(observation, explore=False)
     assert action == 4
-    assert action in BUTTONS
+    assert action in FOUR_ACTIONS
 
 
 def test_observations_are_scaled_by_the_bounds_and_clipped():
@@ -107,20 +107,20 @@ def test_observations_are_scaled_by_the_bounds_and_clipped():
     assert np.array_equal(agent.q_values(np.array([2, -2, 0], dtype=np.int8)), inside)
     assert np.array_equal(agent.q_values(np.float32([2.0, -2.0, 0.0])), inside)
     # The bounds -2 and 2 of the space become 0 and 1 in the network.
-    (core,) = agent.networks
-    assert np.array_equal(core.values([1.0, 0.0, 0.5]), inside)
+    (network,) = agent.networks
+    assert np.array_equal(network.values([1.0, 0.0, 0.5]), inside)
 
 
 @pytest.mark.parametrize("action", [1, 6, 2.7, np.nan, "left", None, [2, 3]])
 def test_actions_outside_a_discrete_space_are_refused_and_not_learned(action):
-    agent = small_agent(BUTTONS)
-    good = [0.0, 0.0, 0.0]
+    agent = small_agent(FOUR_ACTIONS)
+    observation = [0.0, 0.0, 0.0]
     before = agent.networks[0].weights()
-    refuses("action", agent.learn, Transition(good, action, 1.0, good, False))
+    refuses("action", agent.learn, Transition(observation, action, 1.0, observation, False))
     assert np.array_equal(agent.networks[0].weights(), before)
 
 
-def test_an_agent_generalizes_by_the_patterns_it_is_given():
+def test_an_agent_with_circular_patterns_generalizes_across_the_ends_of_a_range():
     tables = [Circular().patterns(40, seed=number) for number in range(3)]
     agent = small_agent(tables=tables)
     np.testing.assert_array_equal(agent.networks[0].table(2), tables[2])
@@ -128,17 +128,17 @@ def test_an_agent_generalizes_by_the_patterns_it_is_given():
     for _ in range(20):
         agent.learn(Transition(observation, [0.5], 3.0, observation, True))
     assert agent.q_values(observation).max() > 1.0
-    around = agent.q_values(np.array([0.3, -1.0, -2.0]))  # on a circle the neighbour of 1.9
-    assert around.max() > 0.5
+    other_end = agent.q_values(np.array([0.3, -1.0, -2.0]))  # on a circle the neighbour of 1.9
+    assert other_end.max() > 0.5
     refuses("tables", small_agent, tables=tables[:2])
 
 
-def test_tables_need_a_row_for_each_symbol():
+def test_tables_of_patterns_need_a_row_for_each_symbol():
     rooms = gym.spaces.MultiDiscrete([3, 4])
 
     def agent_with(*n_rows):
         tables = [Circular().patterns(40, seed=number)[:n] for number, n in enumerate(n_rows)]
-        return SDNNQLearning(rooms, BUTTONS, approximator=SMALL, tables=tables)
+        return SDNNQLearning(rooms, FOUR_ACTIONS, approximator=SMALL, tables=tables)
 
     assert agent_with(3, 4).networks[0].table(1).shape == (4, 40)
     refuses("tables[1]", agent_with, 3, 5)

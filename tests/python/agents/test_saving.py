@@ -2,6 +2,7 @@
 
 import copy
 import inspect
+import itertools
 import json
 import pickle
 import subprocess
@@ -33,14 +34,14 @@ from stopped_training import states_equal
 
 SMALL = SDNNCConfig(n_pattern_units=20, n_hidden_units=60, n_active_units=20, n_actions=5)
 PLANE = gym.spaces.Box(-1.0, 1.0, (2,), dtype=np.float64)
-WIDE = gym.spaces.Box(-1.0, 1.0, (6,), dtype=np.float64)
+SIX_VARIABLES = gym.spaces.Box(-1.0, 1.0, (6,), dtype=np.float64)
 UNBOUNDED = gym.spaces.Box(-np.inf, np.inf, (3,), dtype=np.float64)
 TORQUE = gym.spaces.Box(-2.0, 2.0, (1,), dtype=np.float32)
-GEARS = gym.spaces.Box(-1, 1, (2,), dtype=np.int64)  # of 5 actions each two are one gear
+INTEGERS = gym.spaces.Box(-1, 1, (2,), dtype=np.int64)  # 5 actions are rounded to 3 integers
 TWO_TORQUES = gym.spaces.Box(-2.0, 2.0, (2,), dtype=np.float32)
 BUTTONS = gym.spaces.Discrete(3, start=2)
 MIXED = gym.spaces.Dict({"at": PLANE, "lamp": gym.spaces.Discrete(2)})
-GENERAL = QLearningConfig(
+WITH_ALL_STATE = QLearningConfig(
     n_steps=3,
     epsilon=0.3,
     final_epsilon=0.0,
@@ -49,22 +50,24 @@ GENERAL = QLearningConfig(
     start_steps=15,
     value_range="adaptive",
 )
-RANDOMLY = replace(SMALL, rounding="random", averaging_interval=7)
-FALLING = QLearningConfig(learning_rate=1.0, final_learning_rate=0.2)
+RANDOM_ROUNDING = replace(SMALL, rounding="random", averaging_interval=7)
+DECREASING = QLearningConfig(learning_rate=1.0, final_learning_rate=0.2)
 TRACES = FuzzyQLearningConfig(trace_decay=0.7, n_greedy_steps=0, epsilon=0.3)
 
-sdnn = partial(SDNNQLearning, approximator=SMALL, learning=GENERAL)
+sdnn = partial(SDNNQLearning, approximator=SMALL, learning=WITH_ALL_STATE)
 AGENTS = {
-    "sdnn": lambda: sdnn(PLANE, TORQUE, approximator=RANDOMLY, seed=5),
+    "sdnn": lambda: sdnn(PLANE, TORQUE, approximator=RANDOM_ROUNDING, seed=5),
     "sdnn, vector": lambda: sdnn(PLANE, TWO_TORQUES, seed=5),
     "sdnn, buttons": lambda: sdnn(MIXED, BUTTONS),
     "sdnn, switches": lambda: sdnn(PLANE, gym.spaces.MultiDiscrete([2, 3])),
-    "sdnn, whole numbers": lambda: sdnn(PLANE, GEARS, seed=5),
+    "sdnn, whole numbers": lambda: sdnn(PLANE, INTEGERS, seed=5),
     "sdnn, warm-up": lambda: sdnn(UNBOUNDED, TORQUE, warm_up_steps=60),
     "sdnn, adaptive ranges": lambda: sdnn(
         PLANE, TORQUE, observation_range="adaptive", warm_up_steps=60
     ),
-    "sdnn, some pairs": lambda: sdnn(WIDE, TORQUE, approximator=replace(SMALL, max_pairs=12)),
+    "sdnn, some pairs": lambda: sdnn(
+        SIX_VARIABLES, TORQUE, approximator=replace(SMALL, max_pairs=12)
+    ),
     "sdnn, tables": lambda: sdnn(PLANE, TORQUE, tables=[np.sign(np.eye(20) - 0.5)] * 2),
     "sdnn, one circular variable": lambda: sdnn(
         gym.spaces.Box(-1.0, 1.0, (1,)), TORQUE, angles=[0]
@@ -73,10 +76,10 @@ AGENTS = {
     "q-lambda": lambda: SDNNQLambda(UNBOUNDED, BUTTONS, warm_up_steps=60, seed=3),
     "actor-critic": lambda: SDNNActorCritic(UNBOUNDED, TWO_TORQUES, seed=1),
     "rbf": lambda: RBFQLearning(
-        PLANE, TORQUE, approximator=RBFNetworkConfig(n_actions=7), learning=GENERAL
+        PLANE, TORQUE, approximator=RBFNetworkConfig(n_actions=7), learning=WITH_ALL_STATE
     ),
     "rbf, vector": lambda: RBFQLearning(
-        PLANE, TWO_TORQUES, approximator=RBFNetworkConfig(n_actions=7), learning=GENERAL
+        PLANE, TWO_TORQUES, approximator=RBFNetworkConfig(n_actions=7), learning=WITH_ALL_STATE
     ),
     "fuzzy": lambda: FuzzyQLearning(PLANE, TORQUE, learning=TRACES, seed=2),
     "fuzzy, vector": lambda: FuzzyQLearning(
@@ -87,11 +90,11 @@ AGENTS = {
 N_STEPS = 150
 
 
-def run_steps(agent, first, last, cut=None):
-    """Run steps ``first`` to ``last``, each of which depends on its number only.
+def run_steps(agent, first, last, copied_step=None, when="", copy_of=None):
+    """Run steps ``first`` to ``last`` with random numbers that depend on their number only.
 
-    At a ``cut`` the agent is replaced after acting and before learning, or after both. Where it
-    has several environments these take turns.
+    In one step the agent is replaced by ``copy_of(agent)``, "before learning" or "after learning".
+    Several environments take turns.
     """
     for step in range(first, last):
         environment = step % agent.n_environments
@@ -106,44 +109,47 @@ def run_steps(agent, first, last, cut=None):
             agent.begin_episode(environment)
         agent.progress = step / N_STEPS
         action = agent.act(observation, environment=environment)
-        if cut is not None and step == cut[0] and cut[1] == "before learning":
-            agent = cut[2](agent)
+        if step == copied_step and when == "before learning":
+            agent = copy_of(agent)
         agent.learn(
             Transition(observation, action, float(rng.normal()), next_observation, step % 17 == 16),
             environment,
         )
         if step % 5 == 0:
             agent.act(observation, explore=False)
-        if cut is not None and step == cut[0] and cut[1] == "after learning":
-            agent = cut[2](agent)
+        if step == copied_step and when == "after learning":
+            agent = copy_of(agent)
     return agent
 
 
-def same_state(first, second):
+def check_same_agent(first, second):
     assert states_equal(first, second)
     assert first.description() == second.description()
 
 
-@pytest.mark.parametrize(("n_environments", "n_cuts"), [(1, 100), (4, 24)])
+@pytest.mark.parametrize(("n_environments", "n_copies"), [(1, 100), (4, 24)])
 @pytest.mark.parametrize("name", AGENTS)
-def test_an_agent_saved_at_any_step_continues_exactly(name, n_environments, n_cuts, tmp_path):
+def test_an_agent_saved_or_copied_at_any_step_continues_exactly(
+    name, n_environments, n_copies, tmp_path
+):
     def new_agent():
         agent = AGENTS[name]()
         agent.n_environments = n_environments
         return agent
 
-    whole = run_steps(new_agent(), 0, N_STEPS)
+    expected = run_steps(new_agent(), 0, N_STEPS)
 
     def from_file(agent):
         agent.save(tmp_path / "agent.safetensors")
         return load_agent(tmp_path / "agent.safetensors")
 
-    copies = [from_file, lambda agent: pickle.loads(pickle.dumps(agent)), copy.deepcopy]
-    cuts = np.random.default_rng(7).permutation(N_STEPS - 1)[:n_cuts]
-    for number, cut in enumerate(cuts):
-        when = ("before learning", "after learning")[number // 3 % 2]
-        resumed = run_steps(new_agent(), 0, N_STEPS, (cut, when, copies[number % 3]))
-        same_state(whole, resumed)
+    ways = [from_file, lambda agent: pickle.loads(pickle.dumps(agent)), copy.deepcopy]
+    # Random steps go through all pairs of a way and a time.
+    ways_and_times = itertools.cycle(itertools.product(ways, ("before learning", "after learning")))
+    steps = np.random.default_rng(7).permutation(N_STEPS - 1)[:n_copies]
+    for step, (copy_of, when) in zip(steps, ways_and_times, strict=False):
+        resumed = run_steps(new_agent(), 0, N_STEPS, step, when, copy_of)
+        check_same_agent(expected, resumed)
 
 
 def test_learning_does_not_change_earlier_copies():
@@ -163,47 +169,49 @@ def test_load_agent_returns_the_class_that_was_saved(tmp_path):
 
 
 def test_a_subclass_of_an_imported_module_can_be_unpickled(tmp_path, monkeypatch):
-    (tmp_path / "docking.py").write_text(
-        "from sdnn.agents import RBFQLearning\nclass Docker(RBFQLearning):\n    pass\n"
+    (tmp_path / "my_agents.py").write_text(
+        "from sdnn.agents import RBFQLearning\nclass MyAgent(RBFQLearning):\n    pass\n"
     )
     code = (
-        "import gymnasium, pickle, sys, docking\n"
+        "import gymnasium, pickle, sys, my_agents\n"
         "spaces = gymnasium.spaces.Box(-1, 1, (2,)), gymnasium.spaces.Discrete(2)\n"
-        "sys.stdout.buffer.write(pickle.dumps(docking.Docker(*spaces)))\n"
+        "sys.stdout.buffer.write(pickle.dumps(my_agents.MyAgent(*spaces)))\n"
     )
     process = subprocess.run(
         [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, check=True
     )
     monkeypatch.syspath_prepend(tmp_path)
-    assert type(pickle.loads(process.stdout)).__name__ == "Docker"
+    assert type(pickle.loads(process.stdout)).__name__ == "MyAgent"
 
 
 def test_actions_keep_the_dtype_of_a_discrete_space(tmp_path):
     if "dtype" not in inspect.signature(gym.spaces.Discrete).parameters:
         pytest.skip("Discrete has one type in this version of Gymnasium")
-    buttons = gym.spaces.Discrete(3, start=1, dtype=np.int32)
-    agent = RBFQLearning(PLANE, buttons)
+    space = gym.spaces.Discrete(3, start=1, dtype=np.int32)
+    agent = RBFQLearning(PLANE, space)
     agent.save(tmp_path / "agent")
-    for again in (agent, load_agent(tmp_path / "agent"), copy.deepcopy(agent)):
-        assert again.action_space == buttons
-        assert again.act(np.zeros(2)).dtype == np.int32
+    for copied in (agent, load_agent(tmp_path / "agent"), copy.deepcopy(agent)):
+        assert copied.action_space == space
+        assert copied.act(np.zeros(2)).dtype == np.int32
 
 
 def test_a_second_class_of_the_same_name_is_refused_except_in_main():
     refuses("RBFQLearning", type, "RBFQLearning", (SDNNQLearning,), {}, error=TypeError)
-    for module in ("__main__", "__main__", "script"):  # a notebook's cell, a script imported too
-        again = type("DefinedAgain", (RBFQLearning,), {"__module__": module})
-    agent = again(PLANE, TORQUE)
+    # A notebook's cell may run twice, and a module may import the script that imports it.
+    for module in ("__main__", "__main__", "script"):
+        agent_class = type("DefinedAgain", (RBFQLearning,), {"__module__": module})
     assert type(pickle.loads(pickle.dumps(AGENTS["rbf"]()))) is RBFQLearning
-    assert type(copy.deepcopy(agent)) is again
+    assert type(copy.deepcopy(agent_class(PLANE, TORQUE))) is agent_class
 
 
-def test_an_unchanged_class_that_is_defined_again_replaces_the_first(tmp_path):
-    first, second = (type("MineAgain", (RBFQLearning,), {}) for _ in range(2))
+def test_an_unchanged_class_that_is_defined_again_replaces_the_first_but_a_changed_one_does_not(
+    tmp_path,
+):
+    first, second = (type("MyAgent", (RBFQLearning,), {}) for _ in range(2))
     second(PLANE, TORQUE).save(tmp_path / "agent")
     assert type(first.load(tmp_path / "agent")) is second
-    type("MineAgain", (RBFQLearning,), {"__annotations__": {"mass": float}})
-    with pytest.raises(ValueError, match="MineAgain"):
+    type("MyAgent", (RBFQLearning,), {"__annotations__": {"mass": float}})
+    with pytest.raises(ValueError, match="MyAgent"):
         first.load(tmp_path / "agent")
 
 
@@ -219,43 +227,44 @@ def test_a_file_without_gymnasium_spaces_is_read(name, n_steps, tmp_path):
     def change(description, _):
         del description["observation_space"], description["action_space"]
 
-    again = load_agent(changed(tmp_path / "python", tmp_path / "cpp", change))
-    assert again.action_space == agent.action_space
-    assert again.observation_space == agent.observation_space
-    for continued in (agent, again):
-        run_steps(continued, n_steps, 90)
-    assert states_equal(agent, again)
+    loaded = load_agent(write_changed(tmp_path / "python", tmp_path / "cpp", change))
+    assert loaded.action_space == agent.action_space
+    assert loaded.observation_space == agent.observation_space
+    for resumed in (agent, loaded):
+        run_steps(resumed, n_steps, 90)
+    assert states_equal(agent, loaded)
 
 
 def test_progress_is_read_from_the_arrays_of_the_file(tmp_path):
     # C++ writes the description of the file that it has read, with the new progress in an array.
-    agent = SDNNQLearning(PLANE, TORQUE, approximator=SMALL, learning=FALLING)
+    agent = SDNNQLearning(PLANE, TORQUE, approximator=SMALL, learning=DECREASING)
     agent.save(tmp_path / "old")
 
     def change(_, arrays):
         arrays["agent.progress"] = np.array(0.5)
 
-    again = load_agent(changed(tmp_path / "old", tmp_path / "new", change))
-    assert (again.progress, again.learning_rate) == (0.5, 0.6)  # half way from 1 to 0.2
+    loaded = load_agent(write_changed(tmp_path / "old", tmp_path / "new", change))
+    assert (loaded.progress, loaded.learning_rate) == (0.5, 0.6)  # half way from 1 to 0.2
 
 
 @pytest.fixture(scope="module")
-def saved(tmp_path_factory):
+def saved_agent(tmp_path_factory):
+    """The path of a file of an agent after 30 steps."""
     path = tmp_path_factory.mktemp("saved") / "agent.safetensors"
     run_steps(AGENTS["sdnn"](), 0, 30).save(path)
     return path
 
 
-def changed(path, to, change):
-    """A copy of a file whose description or arrays are changed."""
+def write_changed(path, new_path, change):
+    """Copy a file, with description and arrays changed by `change(description, arrays)`."""
     description, arrays = read_file(path, "agent")
     change(description, arrays)
-    write_file(to, "agent", arrays, description)
-    return to
+    write_file(new_path, "agent", arrays, description)
+    return new_path
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    ("change", "field"),
     [
         (lambda d, a: d.update({"class": "Sarsa"}), "Sarsa"),
         (lambda d, a: d["learning"].update(speed=7.0), "speed"),
@@ -278,19 +287,18 @@ def changed(path, to, change):
     ],
 )
 def test_inconsistent_files_are_refused_with_the_name_of_the_field(
-    saved, tmp_path, change, message
+    saved_agent, tmp_path, change, field
 ):
-    path = changed(saved, tmp_path / "changed", change)
-    refuses(message, load_agent, path)
+    refuses(field, load_agent, write_changed(saved_agent, tmp_path / "changed", change))
 
 
-def test_a_failed_save_keeps_the_old_file(saved, tmp_path):
-    agent = load_agent(saved)
+def test_a_failed_save_keeps_the_old_file(saved_agent, tmp_path):
+    agent = load_agent(saved_agent)
     path = tmp_path / "no folder" / "agent"
     refuses("agent", agent.save, path, error=FileNotFoundError)
     agent.save(tmp_path / "agent")
     before = (tmp_path / "agent").read_bytes()
-    agent._observations.space = gym.spaces.Graph(PLANE, None)
+    agent._observations.space = gym.spaces.Graph(PLANE, None)  # cannot be saved
     refuses("Graph", agent.save, tmp_path / "agent", error=TypeError)
     assert (tmp_path / "agent").read_bytes() == before
     assert [file.name for file in tmp_path.iterdir()] == ["agent"]
@@ -298,17 +306,17 @@ def test_a_failed_save_keeps_the_old_file(saved, tmp_path):
 
 def test_the_files_read_by_tests_in_cpp_are_up_to_date(tmp_path):
     agent_files.write(tmp_path)
-    names, again = (
+    names, new_names = (
         sorted(path.relative_to(folder) for path in folder.rglob("*.*"))
         for folder in (agent_files.FOLDER, tmp_path)
     )
-    assert names == again
+    assert names == new_names
     for name in names:
         stored, written = agent_files.FOLDER / name, tmp_path / name
         if name.suffix == ".json":
             assert json.loads(stored.read_text()) == json.loads(written.read_text()), name
         elif name.stem == "estimator":
-            first, second = (SDNNRegressor.load(path) for path in (stored, written))
-            np.testing.assert_array_equal(first.weights_, second.weights_)
+            weights, new_weights = (SDNNRegressor.load(path).weights_ for path in (stored, written))
+            np.testing.assert_array_equal(weights, new_weights)
         else:
-            same_state(load_agent(stored), load_agent(written))
+            check_same_agent(load_agent(stored), load_agent(written))

@@ -24,7 +24,7 @@ FIRST = {
     "q-lambda": (CODE, RATES | {"schedule_steps": 0}),
     "actor-critic": (CODE, {"schedule_steps": 100}),
 }
-"""Settings of which one at a time is changed: small, and such that the others matter."""
+"""Settings of approximator and learning rule, of which one at a time is changed."""
 
 WITHOUT_EFFECT = {
     "every agent": {
@@ -41,17 +41,17 @@ WITHOUT_EFFECT = {
 """Settings that change nothing, and why."""
 
 
-def others(field, value):
+def other_values(field, value):
     """Return other values of a setting, some of them out of its range."""
-    kinds = typing.get_args(field.type) or (field.type,)
+    types = typing.get_args(field.type) or (field.type,)  # of a string, its possible values
     if isinstance(value, bool):
         return [not value]
     if isinstance(value, str):
-        return [word for word in kinds if word != value]
-    if isinstance(value, tuple):  # of each input
-        return [(True, False, False) if bool in kinds else (3, 0, 0)]
-    kind = int if int in kinds else float
-    numbers = [kind(number) for number in ((value or 0) * 2, 0.3, 0.9, 1, 2, 5, 20)]
+        return [word for word in types if word != value]
+    if isinstance(value, tuple):  # a value for each of three inputs
+        return [(True, False, False) if bool in types else (3, 0, 0)]
+    number_type = int if int in types else float
+    numbers = [number_type(number) for number in ((value or 0) * 2, 0.3, 0.9, 1, 2, 5, 20)]
     return [number for number in dict.fromkeys(numbers) if number != value]
 
 
@@ -71,10 +71,10 @@ def actions_and_values(entry, n_dimensions, approximator, learning):
     for step in range(N_STEPS):
         agent.progress = step / N_STEPS
         action = agent.act(observation)
-        place = np.clip(observation[0] + 0.2 * action.mean() + random.normal(0, 0.02), 0, 1)
-        next_observation = np.array([place, *random.random(2)])
-        reward = float(place > 0.7) + 0.5 * observation[1] - 0.1 * abs(action[0])
-        end = random.random()
+        position = np.clip(observation[0] + 0.2 * action.mean() + random.normal(0, 0.02), 0, 1)
+        next_observation = np.array([position, *random.random(2)])
+        reward = float(position > 0.7) + 0.5 * observation[1] - 0.1 * abs(action[0])
+        end = random.random()  # episodes are terminated or truncated with a probability of 5% each
         agent.learn(Transition(observation, action, reward, next_observation, end < 0.05))
         observation = next_observation
         if end < 0.1:
@@ -83,9 +83,9 @@ def actions_and_values(entry, n_dimensions, approximator, learning):
         actions.append(action)
     names = ("action_probabilities", "q_values", "value")
     values = next(getattr(agent, name) for name in names if hasattr(agent, name))
-    probes = random.random((20, 3))
-    actions += [agent.act(probe, explore=False) for probe in probes]
-    return np.stack(actions), np.stack([values(probe) for probe in probes])
+    observations = random.random((20, 3))
+    actions += [agent.act(x, explore=False) for x in observations]
+    return np.stack(actions), np.stack([values(x) for x in observations])
 
 
 @pytest.mark.parametrize("n_dimensions", [1, 2])
@@ -93,37 +93,37 @@ def actions_and_values(entry, n_dimensions, approximator, learning):
 def test_every_setting_changes_what_an_agent_does_unless_listed(name, n_dimensions):
     entry = AGENTS[name]
     approximator, learning = FIRST.get(name, ({}, {}))
-    parts = {
+    configs = {
         "approximator": entry.approximator(**approximator),
         "learning": entry.learning(**learning),
     }
-    usual = actions_and_values(entry, n_dimensions, **parts)
+    expected = actions_and_values(entry, n_dimensions, **configs)
 
-    def has_effect(part, field):
-        for value in others(field, getattr(parts[part], field.name)):
+    def has_effect(option, field):
+        for value in other_values(field, getattr(configs[option], field.name)):
             try:
-                changed = dataclasses.replace(parts[part], **{field.name: value})
-                outcome = actions_and_values(entry, n_dimensions, **parts | {part: changed})
-            except ValueError:
+                changed = dataclasses.replace(configs[option], **{field.name: value})
+                outcome = actions_and_values(entry, n_dimensions, **configs | {option: changed})
+            except ValueError:  # out of range
                 continue
-            if not all(map(np.array_equal, outcome, usual)):
+            if not all(map(np.array_equal, outcome, expected)):
                 return True
         return False
 
-    fields = [(part, field) for part, config in parts.items() for field in fields_of(type(config))]
+    fields = [(option, field) for option in configs for field in fields_of(type(configs[option]))]
     listed = WITHOUT_EFFECT["every agent"] | WITHOUT_EFFECT.get(name, {})
-    without = {field.name for part, field in fields if not has_effect(part, field)}
-    assert without == listed.keys() & {field.name for _, field in fields}
+    without_effect = {field.name for option, field in fields if not has_effect(option, field)}
+    assert without_effect == listed.keys() & {field.name for _, field in fields}
 
 
-def test_schedules_need_schedule_steps_or_follow_the_progress():
+def test_schedules_follow_their_steps_or_without_them_the_progress_of_a_training():
     def agent(**learning):
         space = gym.spaces.Box(-1.0, 1.0, (3,), np.float64)
         return SDNNQLambda(space, gym.spaces.Discrete(2), learning=QLambdaConfig(**learning))
 
     refuses("schedule", agent, schedule="exponential", final_epsilon=0.1)
     refuses("exploration_fraction", agent, exploration_fraction=0.5)
-    # From 1 to 0.1: half way by the progress; or unchanged, as no step has been learned.
+    # Half way from 1 to 0.1 by the progress; or 1 by the steps, of which none has been learned.
     for schedule_steps, expected in ((0, 0.55), (100, 1.0)):
         warming_up = agent(schedule_steps=schedule_steps, final_learning_rate=0.1)
         warming_up.progress = 0.5

@@ -21,7 +21,7 @@ class Spaces:
         self.observation_space, self.action_space = observation_space, action_space
 
 
-OBSERVED = [
+OBSERVATION_SPACES = [
     (PLANE, Box(-1.0, 1.0, (2,), np.float16), True),
     (PLANE, Box(-1.0, 1.000001, (2,), np.float64), True),  # bounds that are equal as floats
     (PLANE, Box(-1.0, 1.001, (2,)), False),
@@ -44,7 +44,7 @@ OBSERVED = [
     (Tuple((Discrete(2), PLANE)), Tuple((Discrete(2), PLANE)), True),
     (Tuple((Discrete(2),)), Tuple((Discrete(2), PLANE)), False),
 ]
-ACTED = [
+ACTION_SPACES = [
     (PLANE, Box(-1.0, 1.0, (2, 1), np.float64), True),
     (PLANE, Box(-5.0, 1.0, (2,)), False),
     (PLANE, Box(-1.0, 1.0, (1,)), False),
@@ -54,11 +54,13 @@ ACTED = [
     (Discrete(3), Discrete(3, start=1), False),
     (MultiDiscrete([2, 3]), MultiDiscrete([2, 3], start=[0, 1]), False),
 ]
+"""Spaces of an agent and of an environment, and whether the agent accepts the environment."""
 
 
 @pytest.mark.parametrize(
     ("name", "agent_space", "env_space", "fits"),
-    [("observation", *case) for case in OBSERVED] + [("action", *case) for case in ACTED],
+    [("observation", *spaces) for spaces in OBSERVATION_SPACES]
+    + [("action", *spaces) for spaces in ACTION_SPACES],
     ids=str,
 )
 def test_environments_are_accepted_if_their_spaces_fit_the_agents(
@@ -70,8 +72,8 @@ def test_environments_are_accepted_if_their_spaces_fit_the_agents(
     )
     if fits:
         require_same_kind(agent, env)
-        return
-    refuses("env", require_same_kind, agent, env)
+    else:
+        refuses("env", require_same_kind, agent, env)
 
 
 def test_spaces_of_a_vector_are_compared_for_a_single_environment():
@@ -111,10 +113,10 @@ def test_keys_of_dict_spaces_are_saved_with_their_types(key, tmp_path):
     space = Dict([(key, PLANE), ("other", Discrete(3))])
     agent = RBFQLearning(space, Discrete(2), seed=1)
     agent.save(tmp_path / "agent")
-    again = load_agent(tmp_path / "agent")
-    assert list(again.observation_space.spaces) == [key, "other"]
+    loaded = load_agent(tmp_path / "agent")
+    assert list(loaded.observation_space.spaces) == [key, "other"]
     observation = space.sample()
-    assert again.act(observation) == agent.act(observation)
+    assert loaded.act(observation) == agent.act(observation)
 
 
 @pytest.mark.parametrize(
@@ -126,15 +128,15 @@ def test_dict_keys_that_cannot_be_saved_are_refused_by_the_constructor(key):
 
 
 @pytest.mark.parametrize("name", ["CartPole-v1", "Pendulum-v1", "MountainCarContinuous-v0"])
-@pytest.mark.parametrize("n", [1, 3])
-def test_batched_spaces_of_a_vector_are_refused_with_the_single_ones(name, n):
-    envs = gym.make_vec(name, num_envs=n)
+@pytest.mark.parametrize("n_environments", [1, 3])
+def test_batched_spaces_of_a_vector_are_refused_and_the_single_ones_named(name, n_environments):
+    envs = gym.make_vec(name, num_envs=n_environments)
     with pytest.raises(ValueError, match="single_observation_space"):
         RBFQLearning(envs.observation_space, envs.action_space)
     assert RBFQLearning(envs.single_observation_space, envs.single_action_space)
 
 
-def test_matrix_shaped_spaces_with_other_rows_or_actions_than_a_batch_are_accepted():
+def test_matrices_that_are_no_batch_of_a_vector_are_accepted_as_observations():
     for observations, actions in (
         (Box(-1.0, 1.0, (3, 2)), PLANE),
         (Box(-1.0, 1.0, (2, 2)), PLANE),
@@ -162,22 +164,22 @@ def test_images_are_refused_with_a_remedy():
 
 
 @pytest.mark.parametrize("agent_class", [RBFQLearning, SDNNQLearning, FuzzyQLearning])
-def test_max_table_bytes_limits_the_sum_of_all_networks(agent_class):
-    def fits(n_dimensions, limit):
-        approximator = agent_class.approximator_type(max_table_bytes=limit)
+def test_max_table_bytes_limits_the_sum_of_the_networks_of_all_action_dimensions(agent_class):
+    def fits(n_dimensions, max_table_bytes):
+        approximator = agent_class.approximator_type(max_table_bytes=max_table_bytes)
         try:
             agent_class(PLANE, Box(-1.0, 1.0, (n_dimensions,)), approximator=approximator)
         except ValueError as error:
             return "max_table_bytes" not in str(error)
         return True
 
-    low, high = 1, 2**30
+    low, high = 1, 2**30  # bisected until `low` is the smallest limit of one network
     while low < high:
         middle = (low + high) // 2
         low, high = (low, middle) if fits(1, middle) else (middle + 1, high)
-    for n in (2, 3):
-        assert fits(n, n * low)
-        assert not fits(n, n * low - 1)
+    for n_dimensions in (2, 3):
+        assert fits(n_dimensions, n_dimensions * low)
+        assert not fits(n_dimensions, n_dimensions * low - 1)
 
 
 def test_bounds_in_a_file_beyond_their_dtype_are_refused():
