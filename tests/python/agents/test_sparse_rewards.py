@@ -1,42 +1,44 @@
 """Sparse rewards: until the first one the agent searches with repeated random actions."""
 
+import itertools
+
 import gymnasium as gym
 import numpy as np
 import pytest
-import sdnn_q_lambda as page
+import sdnn_q_lambda as transcription
 
 from sdnn.agents import QLambdaConfig, SDNNQLambda, Transition, evaluate, learn_from
 from stopped_training import states_equal
 
 SQUARE = gym.spaces.Box(0.0, 1.0, (2,), np.float64)
-KNOWN = {"inputs": "all", "angle_pairs": "none", "observation_range": (0.0, 1.0)}
-HERE = [0.5, 0.5]
+NO_WARM_UP = {"inputs": "all", "angle_pairs": "none", "observation_range": (0.0, 1.0)}
+OBSERVATION = [0.5, 0.5]
 
 
 def new_agent(**learning):
     actions = gym.spaces.Discrete(4)
-    return SDNNQLambda(SQUARE, actions, learning=QLambdaConfig(**learning), seed=1, **KNOWN)
+    return SDNNQLambda(SQUARE, actions, learning=QLambdaConfig(**learning), seed=1, **NO_WARM_UP)
 
 
 def act_and_learn(agent, rewards):
     """Act in one state; return the actions."""
     actions = []
     for reward in rewards:
-        actions.append(int(agent.act(HERE)))
-        agent.learn(Transition(HERE, actions[-1], reward, HERE, False))
+        actions.append(int(agent.act(OBSERVATION)))
+        agent.learn(Transition(OBSERVATION, actions[-1], reward, OBSERVATION, False))
     return actions
 
 
 def longest_run(actions):
-    changes = np.flatnonzero(np.diff(actions))
-    return max(np.diff(np.concatenate([[-1], changes, [len(actions) - 1]])))
+    """Return the length of the longest sequence of equal actions."""
+    return max(len(list(run)) for _, run in itertools.groupby(actions))
 
 
 def test_random_actions_are_repeated_while_all_rewards_were_zero():
     # Among 1,000 actions drawn of four, a run of 15 has a probability of 1000 / 4^14.
     no_rewards = [0.0] * 1000
     assert longest_run(act_and_learn(new_agent(), no_rewards)) >= 40
-    # Two runs of the same action may meet.
+    # Two repeated actions in a row may be the same.
     assert longest_run(act_and_learn(new_agent(max_action_repeat=20), no_rewards)) < 2 * 20
     for learning in ({"max_action_repeat": 1}, {"epsilon": 0.0}):
         assert longest_run(act_and_learn(new_agent(**learning), no_rewards)) < 15
@@ -54,47 +56,50 @@ def test_random_actions_are_not_repeated_in_discrete_spaces():
 
 @pytest.mark.parametrize("has_warm_up", [False, True])
 def test_transitions_of_a_log_do_not_count_as_steps_of_a_search(has_warm_up):
-    # After 20 steps of search a reward is read from a log: the search takes twice as many more.
+    # 20 steps find no reward, then a log has one: the search lasts for twice as many more steps.
     agent = new_agent()
     if has_warm_up:
         agent = SDNNQLambda(SQUARE, gym.spaces.Discrete(4), warm_up_steps=300, seed=1)
     act_and_learn(agent, [0.0] * 20)
-    log = [Transition(HERE, 1, 0.0, HERE, False)] * 400
-    learn_from(agent, [*log, Transition(HERE, 1, 1.0, HERE, True)])
+    log = [Transition(OBSERVATION, 1, 0.0, OBSERVATION, False)] * 400
+    learn_from(agent, [*log, Transition(OBSERVATION, 1, 1.0, OBSERVATION, True)])
     assert int(agent.state()["agent.n_random_left"]) == 2 * 20
 
 
 def test_ends_of_episodes_are_counted_only_after_the_search():
     agent = new_agent()
     act_and_learn(agent, [0.0] * 10)
-    agent.learn(Transition(HERE, 0, 1.0, HERE, True))  # the first reward, which ends the search
+    agent.learn(
+        Transition(OBSERVATION, 0, 1.0, OBSERVATION, True)
+    )  # the first reward, which ends the search
     assert "agent.n_ended" not in agent.state()
     act_and_learn(agent, [1.0] * 20)
-    agent.learn(Transition(HERE, 0, 1.0, HERE, True))
+    agent.learn(Transition(OBSERVATION, 0, 1.0, OBSERVATION, True))
     assert int(agent.state()["agent.n_ended"]) == 1
 
 
 @pytest.mark.parametrize("n_steps", [30, 80])  # before and after the first reward, at step 61
 def test_a_search_resumes_exactly(n_steps, tmp_path):
     rewards = [0.0] * 60 + [1.0] + [0.0] * 200
-    whole, part = new_agent(), new_agent()
-    act_and_learn(whole, rewards)
-    act_and_learn(part, rewards[:n_steps])
-    part.save(tmp_path / "agent.safetensors")
-    part = SDNNQLambda.load(tmp_path / "agent.safetensors")
-    act_and_learn(part, rewards[n_steps:])
-    assert states_equal(whole, part)
+    agent, saved = new_agent(), new_agent()
+    act_and_learn(agent, rewards)
+    act_and_learn(saved, rewards[:n_steps])
+    saved.save(tmp_path / "agent.safetensors")
+    resumed = SDNNQLambda.load(tmp_path / "agent.safetensors")
+    act_and_learn(resumed, rewards[n_steps:])
+    assert states_equal(agent, resumed)
 
 
 def test_the_numpy_transcription_searches_with_the_same_actions_and_weights():
-    settings = page.Settings(seed=1, n_anchor_patterns=9, n_interpolated=44)
-    slow = page.new_agent(2, [4], settings)
+    settings = transcription.Settings(seed=1, n_anchor_patterns=9, n_interpolated=44)
+    slow = transcription.new_agent(2, [4], settings)
     agent = new_agent()
     rng = np.random.default_rng(1)
     state = rng.random(2)
     for step in range(160):
         action, next_state = slow.act(state), rng.random(2)
         assert int(agent.act(state)) == action[0]
+        # An episode ends before the first reward, one with a reward, and one after the search.
         reward, terminated = float(step in (40, 70)), step in (20, 70, 150)
         slow.learn(state, action, reward, next_state, terminated)
         agent.learn(Transition(state, action[0], reward, next_state, terminated))
