@@ -7,22 +7,23 @@ import pytest
 from sdnn.agents import SDNNQLearning, Transition
 
 
-def test_actions_of_40_unrelated_rooms_are_learned_exactly():
-    # Each room has a random right action: neighbours do not help.
-    right = np.random.default_rng(1).integers(0, 4, 40)
+def test_greedy_actions_in_40_unrelated_states_are_the_rewarded_ones():
+    # A random action of each state is rewarded: states with near numbers do not help.
+    rewarded = np.random.default_rng(1).integers(0, 4, 40)
     agent = SDNNQLearning(gym.spaces.Discrete(40), gym.spaces.Discrete(4), seed=1)
-    assert agent.approximator.n_inputs == 2
+    assert agent.approximator.n_inputs == 2, "the only input is repeated"
     assert agent.approximator.n_symbols == (40, 40)
-    for room, action in np.random.default_rng(2).permutation(list(np.ndindex(40, 4)) * 15):
-        agent.learn(Transition(room, action, float(action == right[room]), room, True))
+    for state, action in np.random.default_rng(2).permutation(list(np.ndindex(40, 4)) * 15):
+        reward = float(action == rewarded[state])
+        agent.learn(Transition(state, action, reward, state, True))
     report = agent.learning_report()
     assert report["q_range"] == (0.0, 1.25)  # rewards of 0 and 1, with a margin above
     n_active = agent.approximator.n_active_units
-    # The lowest value has 1/15 of a window's units active, the highest all but as many.
-    fewest = n_active // 15
-    assert report["value_step"] == pytest.approx(1.25 / (n_active - 2 * fewest))
+    # The lowest value has 1/15 of a window's units active, the highest all but 1/15.
+    n_inactive = n_active // 15
+    assert report["value_step"] == pytest.approx(1.25 / (n_active - 2 * n_inactive))
     assert 0.0 < report["mean_error"] < 0.25
-    assert [agent.act(room, explore=False) for room in range(40)] == right.tolist()
+    assert [agent.act(state, explore=False) for state in range(40)] == rewarded.tolist()
 
 
 def test_an_agent_of_500_discrete_states_takes_less_than_10_mb():
@@ -30,12 +31,12 @@ def test_an_agent_of_500_discrete_states_takes_less_than_10_mb():
     agent = SDNNQLearning(gym.spaces.Discrete(500), gym.spaces.Discrete(6), seed=1)
     n_bytes = sum(array.nbytes for array in agent.state().values())
     assert n_bytes < 10e6
-    for place in (0, 7, 499):
-        agent.learn(Transition(place, 3, 1.0 + place, 0, True))
+    for state in (0, 7, 499):
+        agent.learn(Transition(state, 3, 1.0 + state, 0, True))
     assert agent.act(499, explore=False) == 3
 
 
-def test_of_30_variables_30_pairs_are_formed_and_the_relevant_one_is_learned():
+def test_of_30_variables_30_pairs_are_formed_and_the_only_relevant_variable_is_learned():
     # All 870 ordered pairs of 30 variables would need two gigabytes with `general`.
     space = gym.spaces.Box(-1.0, 1.0, (30,), dtype=np.float64)
     agent = SDNNQLearning(space, gym.spaces.Discrete(2), preset="small", seed=1)

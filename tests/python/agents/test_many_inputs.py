@@ -1,4 +1,4 @@
-"""Tasks with many inputs: noise is left out, binary inputs stay together, steps stay short."""
+"""Tasks with many inputs: noise is left out, one-hot inputs are kept, pairs are limited."""
 
 import gymnasium as gym
 import numpy as np
@@ -8,19 +8,19 @@ from sdnn.approximators import LinearSDNNConfig
 
 
 class WithNoise(gym.ObservationWrapper):
-    """CartPole with `n` further inputs: numbers, or binary ones of which one is 1 at a time."""
+    """CartPole with `n` inputs of noise: "numbers", "bits", or "one-hot" (a single 1 at a time)."""
 
-    def __init__(self, n, kind):
+    def __init__(self, n, noise_type):
         super().__init__(gym.make("CartPole-v1"))
         bounds = self.env.observation_space
         low, high = np.append(bounds.low, np.zeros(n)), np.append(bounds.high, np.ones(n))
         self.observation_space = gym.spaces.Box(low.astype(np.float32), high.astype(np.float32))
-        self._n, self._kind = n, kind
+        self._n, self._noise_type = n, noise_type
 
     def observation(self, observation):
-        if self._kind == "numbers":
+        if self._noise_type == "numbers":
             noise = self.np_random.random(self._n)
-        elif self._kind == "bits":
+        elif self._noise_type == "bits":
             noise = self.np_random.integers(2, size=self._n)
         else:
             noise = np.arange(self._n) == self.np_random.integers(self._n)
@@ -28,7 +28,10 @@ class WithNoise(gym.ObservationWrapper):
 
 
 class Square(gym.Env):
-    """A square of cells as binary variables: a one-hot vector of cells, or two of coordinates."""
+    """Cells from corner (0, 0) to the opposite one, at a cost of 1 for each step.
+
+    Observations are a one-hot vector of all cells, or one for each of two coordinates.
+    """
 
     action_space = gym.spaces.Discrete(4)
 
@@ -43,9 +46,8 @@ class Square(gym.Env):
         return self._observation(), {}
 
     def step(self, action):
-        self._cell = np.clip(
-            self._cell + [(1, 0), (-1, 0), (0, 1), (0, -1)][action], 0, self._size - 1
-        )
+        move = [(1, 0), (-1, 0), (0, 1), (0, -1)][action]
+        self._cell = np.clip(self._cell + move, 0, self._size - 1)
         return self._observation(), -1.0, bool((self._cell == self._size - 1).all()), False, {}
 
     def _observation(self):
@@ -56,26 +58,29 @@ class Square(gym.Env):
 
 
 def test_noise_is_left_out_however_many_inputs_it_has():
-    for kind in ("numbers", "bits", "one-hot"):
-        agent = SDNNQLambda(env := WithNoise(100, kind), seed=1)
+    for noise_type in ("numbers", "bits", "one-hot"):
+        env = WithNoise(100, noise_type)
+        agent = SDNNQLambda(env, seed=1)
         agent.train(env, steps=1001, seed=1)  # inputs are chosen after 1,000
         chosen = [variable for _, variables in agent.inputs for variable in variables]
         assert chosen[:4] == [0, 1, 2, 3], "the variables of CartPole"
         # A single one of a hundred numbers may seem relevant by chance.
-        assert len(chosen) <= (5 if kind == "numbers" else 4)
+        assert len(chosen) <= (5 if noise_type == "numbers" else 4)
 
 
-def test_binary_inputs_are_kept_as_a_whole_and_learned():
+def test_one_hot_inputs_are_kept_as_a_whole_and_the_shortest_path_is_learned():
     for one_hot in (True, False):
         env = gym.wrappers.TimeLimit(Square(6, one_hot), 100)
         agent = SDNNQLambda(env, seed=1)
         agent.train(env, steps=6000, seed=1)
         assert len(agent.inputs) == env.observation_space.shape[0]
-        assert evaluate(agent, env, episodes=1, seed=1).mean_return == -10.0, "5 + 5 steps"
+        assert evaluate(agent, env, episodes=1, seed=1).mean_return == -(5 + 5), (
+            "steps to cell 5, 5"
+        )
 
 
 def max_pairs(env, **options):
-    """Return the limit of pairs that a new agent chooses at the end of its warm-up."""
+    """Return the limit of pairs of inputs that a new agent has after its warm-up."""
     agent = SDNNQLambda(env, seed=1, **options)
     agent.train(env, steps=1001, seed=1)  # the warm-up takes 1,000
     return agent.readout.config.max_pairs

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-import sdnn_q_learning as page
+import sdnn_q_learning as transcription
 from hypothesis import given, settings, strategies as st
 
 from handed_over import transcribe
@@ -13,7 +13,7 @@ from sdnn.coding import Circular, Symbolic
 
 SMALL = {"n_inputs": 3, "n_pattern_units": 40, "n_hidden_units": 120, "n_active_units": 30}
 
-ODD_SIZES = {
+UNUSUAL_SETTINGS = {
     "two inputs": {"n_inputs": 2, "n_pattern_units": 37, "n_hidden_units": 101},
     "three inputs": {"n_inputs": 3, "n_pattern_units": 65, "n_hidden_units": 129},
     "five inputs": {"n_inputs": 5, "n_pattern_units": 50, "n_hidden_units": 90},
@@ -42,10 +42,10 @@ ODD_SIZES = {
     "windows of all units": {"n_inputs": 2, "n_hidden_units": 33},
     "more than one word ladder": {"n_inputs": 2, "n_pattern_units": 300},
 }
-ODD_DEFAULTS = {"n_pattern_units": 60, "n_hidden_units": 150, "n_active_units": 33}
+UNUSUAL_SIZES = {"n_pattern_units": 60, "n_hidden_units": 150, "n_active_units": 33}
 
 
-def next_state(rng, state):
+def state_after(rng, state):
     """Return a state near the last one, or rarely anywhere, or at corners of the cube."""
     chance = rng.integers(20)
     if chance == 0:
@@ -55,34 +55,31 @@ def next_state(rng, state):
     return np.clip(state + 0.05 * rng.standard_normal(state.size), 0.0, 1.0)
 
 
-def assert_equal_parameters(core, transcription):
-    assert np.array_equal(core.weights(), transcription.weights)
-    assert np.array_equal(core.thresholds(), transcription.thresholds)
+def assert_equal_parameters(core, slow):
+    assert np.array_equal(core.weights(), slow.weights)
+    assert np.array_equal(core.thresholds(), slow.thresholds)
 
 
 def compare_while_learning(config, seed, n_steps, compare_weights_every):
     """Train core and transcription alike; return the share of steps that change weights."""
     core = _core.SDNNC(config, seed)
-    transcription = transcribe(core)
+    slow = transcribe(core)
     rng = np.random.default_rng(seed)
     state = rng.random(config.n_inputs)
-    span = config.q_high - config.q_low
     n_corrected = 0
     for step in range(n_steps):
         action = int(rng.integers(core.n_actions))
-        q_hat = config.q_low + span * float(rng.uniform(-0.2, 1.2))
-        expected = transcription.values(state)
+        # Targets are up to a fifth of the range of values beyond it.
+        target = config.q_low + (config.q_high - config.q_low) * float(rng.uniform(-0.2, 1.2))
+        expected = slow.values(state)
         assert np.array_equal(core.values(state), expected), step
         assert core.value(state, action) == expected[action]
-        core.update(state, action, q_hat)
-        n_corrected += transcription.update(state, action, q_hat) > 0
-        next_observation = next_state(rng, state)
-        if step % compare_weights_every == 0:
-            assert np.array_equal(core.potentials(state), transcription.potentials(state)), step
-            assert_equal_parameters(core, transcription)
-        state = next_observation
-    assert np.array_equal(core.potentials(state), transcription.potentials(state))
-    assert_equal_parameters(core, transcription)
+        core.update(state, action, target)
+        n_corrected += slow.update(state, action, target) > 0
+        if step % compare_weights_every == 0 or step == n_steps - 1:
+            assert np.array_equal(core.potentials(state), slow.potentials(state)), step
+            assert_equal_parameters(core, slow)
+        state = state_after(rng, state)
     return n_corrected / n_steps
 
 
@@ -98,9 +95,9 @@ def test_sdnn_c_of_five_and_six_inputs_equals_its_transcription(n_inputs):
     assert share_corrected > 2 / 3
 
 
-@pytest.mark.parametrize("name", ODD_SIZES)
+@pytest.mark.parametrize("name", UNUSUAL_SETTINGS)
 def test_sdnn_c_of_unusual_settings_equals_its_transcription(name):
-    config = _core.SDNNCConfig(**{**ODD_DEFAULTS, **ODD_SIZES[name]})
+    config = _core.SDNNCConfig(**{**UNUSUAL_SIZES, **UNUSUAL_SETTINGS[name]})
     share_corrected = compare_while_learning(config, 3, 500, 100)
     assert share_corrected > 0.6
 
@@ -110,19 +107,18 @@ def test_sdnn_c_of_unusual_settings_equals_its_transcription(name):
     n_inputs=st.integers(2, 4),
     n_pattern_units=st.integers(2, 70),
     n_hidden_units=st.integers(1, 140),
-    window=st.floats(0, 1),
+    active_share=st.floats(0, 1),
     lattice=st.integers(1, 8),
     seed=st.integers(0, 2**64 - 1),
 )
 def test_sdnn_c_of_any_size_equals_its_transcription(
-    n_inputs, n_pattern_units, n_hidden_units, window, lattice, seed
+    n_inputs, n_pattern_units, n_hidden_units, active_share, lattice, seed
 ):
-    n_active = 1 + round(window * (n_hidden_units - 1))
     config = _core.SDNNCConfig(
         n_inputs=n_inputs,
         n_pattern_units=n_pattern_units,
         n_hidden_units=n_hidden_units,
-        n_active_units=n_active,
+        n_active_units=1 + round(active_share * (n_hidden_units - 1)),
         lattice=lattice,
         initial_threshold=20.0,
     )
@@ -130,28 +126,27 @@ def test_sdnn_c_of_any_size_equals_its_transcription(
 
 
 def test_the_transcription_maps_counts_to_values_as_in_the_paper():
-    settings = page.Settings()
-    counts = np.arange(301)
-    np.testing.assert_array_equal(
-        page.g(counts, settings), np.clip((2 * counts - 300) / 13, -20, 20)
-    )
-    values = {-30.0: 20, -20.0: 20, 0.0: 150, 2.0: 163, 1 / 13: 151, 20.0: 280, 99.0: 280}
-    assert {q: page.g_inverse(q, settings) for q in values} == values
+    # Of a window's 300 units, 20 are active for the lowest value, -20, and 280 for the highest, 20.
+    settings, counts = transcription.Settings(), np.arange(301)
+    expected = np.clip((2 * counts - 300) / 13, -20, 20)
+    np.testing.assert_array_equal(transcription.g(counts, settings), expected)
+    counts_of = {-30.0: 20, -20.0: 20, 0.0: 150, 1 / 13: 151, 2.0: 163, 20.0: 280, 99.0: 280}
+    assert {q: transcription.g_inverse(q, settings) for q in counts_of} == counts_of
 
 
 def test_pattern_tables_of_two_inputs_are_uncorrelated():
     network = _core.SDNNC(_core.SDNNCConfig(), 5)
-    first, second = (network.table(mu).astype(int) for mu in (0, 1))
-    anchors = [45 * i for i in range(8)]
-    # Products of balanced random patterns of 200 units have a deviation of sqrt(200) = 14.1.
-    assert np.abs(first[anchors] @ second[anchors].T).max() < 5 * 14.2
-    off_diagonal = first[anchors] @ first[anchors].T - 200 * np.eye(8, dtype=int)
-    assert np.abs(off_diagonal).max() < 5 * 14.2
+    anchors = [45 * i for i in range(8)]  # rows of random patterns; others are interpolated
+    first, second = (network.table(i).astype(int)[anchors] for i in (0, 1))
+    limit = 5 * np.sqrt(200)  # products of random patterns of 200 units deviate by sqrt(200)
+    assert np.abs(first @ second.T).max() < limit
+    assert np.abs(first @ first.T - 200 * np.eye(8, dtype=int)).max() < limit
 
 
 def test_the_learning_coefficient_scales_weights_but_not_values():
     small, large = (
-        SDNNC(SDNNCConfig(**SMALL, learning_coefficient=c), seed=1) for c in (0.125, 8.0)
+        SDNNC(SDNNCConfig(**SMALL, learning_coefficient=coefficient), seed=1)
+        for coefficient in (0.125, 64 * 0.125)
     )
     state = [0.1, 0.5, 0.9]
     for _ in range(30):
@@ -163,7 +158,7 @@ def test_the_learning_coefficient_scales_weights_but_not_values():
 
 
 @pytest.mark.parametrize(
-    "make",
+    "converted",
     [
         list,
         tuple,
@@ -173,12 +168,13 @@ def test_the_learning_coefficient_scales_weights_but_not_values():
         lambda state: np.array(state, dtype=">f8"),
         lambda state: np.array(state, dtype=np.float32),
     ],
+    ids=["list", "tuple", "array", "stride 2", "stride -1", "big-endian", "float32"],
 )
-def test_states_of_any_sequence_dtype_and_stride_give_the_same_values(make):
+def test_states_of_any_sequence_dtype_and_stride_give_the_same_values(converted):
     network = SDNNC(SDNNCConfig(**SMALL), seed=1)
     state = [0.125, 0.5, 0.875]
     network.update(state, 3, 20.0)
-    assert np.array_equal(network.values(make(state)), network.values(np.array(state)))
+    assert np.array_equal(network.values(converted(state)), network.values(np.array(state)))
 
 
 def test_returned_arrays_are_copies():
@@ -190,22 +186,22 @@ def test_returned_arrays_are_copies():
         assert not np.array_equal(array, read())
 
 
-def test_patterns_of_codings_replace_the_drawn_tables():
+def test_patterns_of_codings_replace_random_ones_as_arrays_or_lists():
     tables = [Circular().patterns(40, seed=1), Symbolic(categories=("a", "b")).patterns(40, seed=2)]
     config = SDNNCConfig(n_inputs=2, n_pattern_units=40, n_hidden_units=90, n_active_units=30)
     network = SDNNC(config, seed=3, tables=tables)
+    of_lists = SDNNC(config, seed=3, tables=[table.tolist() for table in tables])
     for _ in range(20):
         network.update([0.2, 0.1], 10, 8.0)
-    np.testing.assert_array_equal(network.values([0.2, 0.1]), network.values([0.2, 0.4]))  # "a"
+        of_lists.update([0.2, 0.1], 10, 8.0)
+    np.testing.assert_array_equal(of_lists.weights(), network.weights())
+    # The second input is "a" below 0.5, else "b".
+    np.testing.assert_array_equal(network.values([0.2, 0.1]), network.values([0.2, 0.4]))
     assert (network.values([0.2, 0.1]) != network.values([0.2, 0.6])).any()
-    same = SDNNC(config, seed=3, tables=[table.tolist() for table in tables])
-    for _ in range(20):
-        same.update([0.2, 0.1], 10, 8.0)
-    np.testing.assert_array_equal(same.weights(), network.weights())
 
 
 @pytest.mark.parametrize(
-    ("tables", "message"),
+    ("tables", "argument"),
     [
         ([np.ones((3, 40))], "tables"),
         ([np.ones((3, 40)), np.ones((3, 41))], "tables"),
@@ -213,30 +209,31 @@ def test_patterns_of_codings_replace_the_drawn_tables():
         ([np.ones(40), np.ones((3, 40))], "tables[0]"),
     ],
 )
-def test_tables_of_wrong_shape_or_values_are_refused(tables, message):
-    refuses(message, SDNNC, SDNNCConfig(n_inputs=2, n_pattern_units=40), tables=tables)
+def test_tables_of_wrong_shape_or_values_are_refused(tables, argument):
+    refuses(argument, SDNNC, SDNNCConfig(n_inputs=2, n_pattern_units=40), tables=tables)
 
 
-def test_averaged_weights_follow_their_formula():
+def test_averaged_weights_are_a_moving_average_of_snapshots():
     config = SDNNCConfig(
         n_inputs=3, n_pattern_units=12, n_hidden_units=90, n_active_units=30, averaging_interval=5
     )
     network, other = _core.SDNNC(config, 3), _core.SDNNC(config, 3)
     rng = np.random.default_rng(1)
-    weights, thresholds, due, n_snapshots = 0.0, 0.0, 5, 0
-    for n in range(1, 1501):
+    weights, thresholds, next_snapshot, n_snapshots = 0.0, 0.0, 5, 0
+    for n_steps in range(1, 1501):
         target = float(rng.uniform(-20, 20))
         network.update(rng.random(3), int(rng.integers(network.n_actions)), target)
-        if n < due:
+        if n_steps < next_snapshot:
             continue
-        passed = max(5, n // 64)
-        share = 1.0 if n_snapshots == 0 else 2.0 ** -max(int(np.log2(n // passed)) - 3, 0)
+        # Intervals grow with the steps. A snapshot's share is a power of 2, after the first one.
+        interval = max(5, n_steps // 64)
+        share = 1.0 if n_snapshots == 0 else 2.0 ** -max(int(np.log2(n_steps // interval)) - 3, 0)
         weights = weights + share * (network.weights() - weights)
         thresholds = thresholds + share * (network.thresholds() - thresholds)
-        due, n_snapshots = n + passed, n_snapshots + 1
+        next_snapshot, n_snapshots = n_steps + interval, n_snapshots + 1
         if n_snapshots % 25:
             continue
-        # Each is rounded once; in between are some thousandths of a step.
+        # The core's averages have fractions of thousandths, and are rounded to integers.
         np.testing.assert_allclose(network.averaged_weights(), weights, atol=0.51)
         np.testing.assert_allclose(network.averaged_thresholds(), thresholds, atol=0.51)
         other.set_parameters(network.averaged_weights(), network.averaged_thresholds())
@@ -247,18 +244,18 @@ def test_averaged_weights_follow_their_formula():
 
 def test_units_at_the_weight_limit_are_not_corrected():
     sizes = {"n_inputs": 2, "n_pattern_units": 12, "n_hidden_units": 40, "n_active_units": 20}
-    free = _core.SDNNC(SDNNCConfig(**sizes), 3)
+    unlimited = _core.SDNNC(SDNNCConfig(**sizes), 3)
     limited = _core.SDNNC(SDNNCConfig(**sizes, weight_limit=3), 3)
-    same = _core.SDNNC(SDNNCConfig(**sizes, weight_limit=16383), 3)
+    with_high_limit = _core.SDNNC(SDNNCConfig(**sizes, weight_limit=16383), 3)
     rng = np.random.default_rng(1)
     for _ in range(400):
         before = limited.weights()
         state, action, target = rng.random(2), int(rng.integers(21)), float(rng.uniform(-20, 20))
-        n_changed = limited.correction_counts[0]
-        for network in (free, limited, same):
+        n_corrections = limited.correction_counts[0]
+        for network in (unlimited, limited, with_high_limit):
             network.update(state, action, target)
-        changed = (limited.weights() != before).any(axis=1)
-        assert changed.any() == (limited.correction_counts[0] > n_changed)
-    np.testing.assert_array_equal(same.weights(), free.weights())
-    assert np.abs(free.weights()).max() > 3  # with two inputs a column is one weight
+        is_corrected = limited.correction_counts[0] > n_corrections
+        assert (limited.weights() != before).any() == is_corrected
+    np.testing.assert_array_equal(with_high_limit.weights(), unlimited.weights())
+    assert np.abs(unlimited.weights()).max() > 3
     assert np.abs(limited.weights()).max() == 3
