@@ -1,9 +1,14 @@
-"""Benchmarks: how times are measured, stored and shown; no test compares speeds."""
+"""Benchmarks: how times are measured, stored and shown; no test compares speeds.
+
+`sdnn bench` measures the package; bench/yardsticks.py adds dense products for comparison.
+"""
 
 import importlib.util
+import itertools
 import json
 import math
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -27,8 +32,8 @@ def quick():
     return json.loads(result.stdout)
 
 
-def script(name):
-    """A script that measures for the documentation, or writes its tables."""
+def load_script(name):
+    """Load a script that measures for the documentation, or writes its tables."""
     path = ROOT / "bench" / f"{name}.py"
     spec = importlib.util.spec_from_file_location(name, path)
     module = importlib.util.module_from_spec(spec)
@@ -40,33 +45,37 @@ def script(name):
 
 @pytest.fixture(scope="module")
 def yardsticks():
+    """The loaded script, with its settings of threads undone after its import."""
     with pytest.MonkeyPatch.context() as patch:
         for name in ("OPENBLAS_NUM", "MKL_NUM", "OMP_NUM", "BLIS_NUM", "VECLIB_MAXIMUM"):
-            patch.setenv(f"{name}_THREADS", "1")  # the script sets them, too
-        return script("yardsticks")
+            patch.setenv(f"{name}_THREADS", "1")
+        return load_script("yardsticks")
 
 
 @pytest.fixture(scope="module")
 def with_yardsticks(quick, yardsticks):
-    """The results of a quick run of the script, which runs the command's measurements."""
+    """The results of a quick run of the script, which adds to those of the command."""
     with pytest.MonkeyPatch.context() as patch:
-        measured = quick
-        patch.setattr(yardsticks, "run_benchmarks", lambda *, quick: measured)
+        patch.setattr(yardsticks, "run_benchmarks", lambda **options: quick)
         return yardsticks.measure(quick=True)
 
 
-def check_like(value, stored, path):
-    """Check that ``value`` has the fields of a stored run, and positive and finite numbers."""
+def check_fields_and_numbers(value, stored, path=()):
+    """Check that ``value`` has the fields of a stored run, and positive and finite numbers.
+
+    ``path`` has the names of fields that lead to the value, for messages.
+    """
     assert type(value) is type(stored), path
     if isinstance(value, list):
         for number, item in enumerate(value):
-            check_like(item, stored[0], (*path, number))
+            check_fields_and_numbers(item, stored[0], (*path, number))
     elif isinstance(value, dict):
-        if path[-1:] not in BY_NAME:
+        depends_on_machine = path[-1:] in MACHINE_FIELDS
+        if not depends_on_machine:
             assert value.keys() == stored.keys(), path
-            stored = {name: stored[name] for name in value}
         for name, item in value.items():
-            check_like(item, stored.get(name, next(iter(stored.values()))), (*path, name))
+            stored_item = next(iter(stored.values())) if depends_on_machine else stored[name]
+            check_fields_and_numbers(item, stored_item, (*path, name))
         if "median" in value:
             assert value["lower"] <= value["median"] <= value["upper"], path
     elif isinstance(value, int | float) and not isinstance(value, bool):
@@ -74,12 +83,14 @@ def check_like(value, stored, path):
         assert value > 0 or path[-1] == "noise", path
 
 
-BY_NAME = {("caches",), ("values",), ("ratio_to_dense",)}
-"""Measurements with a field for each cache or instruction set."""
+MACHINE_FIELDS = {("caches",), ("values",), ("ratio_to_dense",)}
+"""Fields with an item for each cache or instruction set of the machine."""
 
 
 def test_a_quick_run_has_the_fields_of_the_stored_run(with_yardsticks):
-    check_like(with_yardsticks, script("performance_tables").stored("performance"), ())
+    check_fields_and_numbers(
+        with_yardsticks, load_script("performance_tables").stored("performance")
+    )
 
 
 def test_a_quick_run_states_the_version_and_the_instruction_sets(quick):
@@ -102,11 +113,8 @@ def test_a_quick_run_measures_the_networks_and_trials_of_the_paper(quick, with_y
             assert list(network[name]) == levels
         assert set(network["dense"]) == {"numpy", "core"}
     assert quick["acrobot"]["n_integration_steps"] == 50  # 1 s in steps of 0.02 s
-    assert [(d["n_inputs"], d["noise"]) for d in quick["decisions"]] == [
-        (4, 0.0),
-        (4, 0.02),
-        (6, 0.02),
-    ]
+    trials = [(decisions["n_inputs"], decisions["noise"]) for decisions in quick["decisions"]]
+    assert trials == [(4, 0.0), (4, 0.02), (6, 0.02)]
     for decisions in quick["decisions"]:
         assert decisions["p50"] <= decisions["p99"] <= decisions["max"]
         assert decisions["max"] <= decisions["max_of_all_runs"]
@@ -115,18 +123,17 @@ def test_a_quick_run_measures_the_networks_and_trials_of_the_paper(quick, with_y
 def test_the_command_and_the_page_show_every_table_and_warn_of_quick_runs(
     quick, with_yardsticks, monkeypatch
 ):
-    measured = quick
-    monkeypatch.setattr("sdnn.benchmarks.run_benchmarks", lambda *, quick: measured)
+    monkeypatch.setattr("sdnn.benchmarks.run_benchmarks", lambda **options: quick)
     result = CliRunner().invoke(main, ["bench", "--quick"], catch_exceptions=False)
     assert result.exit_code == 0
-    page = script("performance_tables")
+    page = load_script("performance_tables")
     text = page.to_markdown(with_yardsticks)
-    shown = report.tables(quick)
-    for table in (*shown, page.dense_table(with_yardsticks)):
+    tables = report.tables(quick)
+    for table in (*tables, page.dense_table(with_yardsticks)):
         assert table.title in text
         assert all(len(row) == len(table.header) for row in table.rows)
-        for row in table.rows:
-            assert table not in shown or row[0].split(",")[0] in result.stdout
+    for row in itertools.chain(*(table.rows for table in tables)):
+        assert row[0].split(",")[0] in result.stdout
     assert report.QUICK_WARNING in text
     assert report.QUICK_WARNING in result.stdout
     assert report.QUICK_WARNING not in page.to_markdown({**with_yardsticks, "quick": False})
@@ -135,19 +142,16 @@ def test_the_command_and_the_page_show_every_table_and_warn_of_quick_runs(
 def test_measurements_alternate_and_omit_cold_repetitions():
     calls = []
 
-    def recorded(name):
-        def repeat(n):
-            calls.append((name, n))
-            return np.arange(n, dtype=np.int64)
-
-        return repeat
+    def times_of(name, n_repetitions):
+        calls.append((name, n_repetitions))
+        return np.arange(n_repetitions, dtype=np.int64)
 
     effort = measurements.Effort(n_rounds=2, n_repetitions=3)
-    times = measurements.in_turns({"a": recorded("a"), "b": recorded("b")}, effort)
+    times = measurements.in_turns({name: partial(times_of, name) for name in "ab"}, effort)
     n = measurements.N_COLD + 3
     assert calls == [("a", n), ("b", n), ("a", n), ("b", n)]
-    kept = list(range(measurements.N_COLD, n))
-    assert times["a"].tolist() == kept + kept
+    warm_times = list(range(measurements.N_COLD, n))
+    assert times["a"].tolist() == warm_times + warm_times
 
 
 def test_the_core_returns_a_time_for_each_repetition():
@@ -155,8 +159,8 @@ def test_the_core_returns_a_time_for_each_repetition():
     times = _core.time_decisions(trial, 3)
     assert times.dtype == np.int64
     assert times.size == trial.n_decisions
-    parts = _core.NetworkParts(trial.agent.networks[0], 1)
-    assert (parts.time_values(3) > 0).all()
+    network_parts = _core.NetworkParts(trial.agent.networks[0], 1)
+    assert (network_parts.time_values(3) > 0).all()
     assert _core.DenseProduct(5, 7, 1).run(0).size == 0
 
 
@@ -167,18 +171,18 @@ def test_unknown_processors_and_caches_are_no_error(tmp_path, monkeypatch, yards
 
 
 def test_caches_of_data_are_read_in_bytes(tmp_path, yardsticks):
-    for index, (level, kind, size) in enumerate(
-        [("1", "Data", "32K"), ("1", "Instruction", "64K"), ("3", "Unified", "8M")]
-    ):
-        folder = tmp_path / f"index{index}"
+    # Linux has such a folder for each cache of a processor.
+    caches = [("1", "Data", "32K"), ("1", "Instruction", "64K"), ("3", "Unified", "8M")]
+    for number, cache in enumerate(caches):
+        folder = tmp_path / f"index{number}"
         folder.mkdir()
-        for name, text in (("level", level), ("type", kind), ("size", size)):
+        for name, text in zip(("level", "type", "size"), cache, strict=True):
             (folder / name).write_text(text + "\n")
     assert yardsticks.caches(tmp_path) == {"L1d": 32 * 2**10, "L3": 8 * 2**20}
 
 
 def test_the_page_of_small_processors_shows_the_stored_measurements():
-    module = script("arm/baselines")
+    module = load_script("arm/baselines")
     text = module.PAGE.read_text()
     assert sys.modules["page"].with_tables(text, module.page_tables()) == text, (
         "docs/evidence/boards.md is not what is stored: run bench/arm/baselines.py --redraw"
@@ -186,7 +190,7 @@ def test_the_page_of_small_processors_shows_the_stored_measurements():
 
 
 def test_the_performance_page_shows_the_stored_run():
-    module = script("performance_tables")
+    module = load_script("performance_tables")
     text = module.PAGE.read_text()
     assert module.stored("performance")["quick"] is False
     assert sys.modules["page"].with_tables(text, module.page_tables()) == text, (

@@ -1,4 +1,4 @@
-"""Benchmarks: pages show what the store holds; scripts are right in cases worked by hand."""
+"""Scripts of bench/other_tasks: pages show stored trials, and cases worked by hand are right."""
 
 import argparse
 import contextlib
@@ -22,10 +22,10 @@ FOLDERS = (BENCH, BENCH / "other_tasks")
 
 @pytest.fixture(scope="module")
 def scripts():
-    """The modules beside the command, whose names and agents are theirs alone while it runs."""
+    """The scripts' modules and study; their names and agents are removed again afterwards."""
     from sdnn.agents.registry import AGENTS
 
-    before, path, agents = set(sys.modules), list(sys.path), dict(AGENTS)
+    modules, path, agents = set(sys.modules), list(sys.path), dict(AGENTS)
     sys.path[:0] = map(str, FOLDERS)
     try:
         import measured
@@ -43,13 +43,14 @@ def scripts():
         sys.path[:] = path
         AGENTS.clear()
         AGENTS.update(agents)
-        for name in set(sys.modules) - before:
+        for name in set(sys.modules) - modules:
             file = getattr(sys.modules[name], "__file__", None) or ""
             if Path(file).parent in FOLDERS:
                 del sys.modules[name]
 
 
 def options_of(folder, *only, jobs=1):
+    """Return the options of a script's command line; `only` selects trials."""
     return argparse.Namespace(folder=folder, only=only, jobs=jobs, redraw=False)
 
 
@@ -64,8 +65,8 @@ def test_the_benchmark_page_has_the_table_of_stored_policies(scripts):
     policies = scripts.policies
     table = policies.table(scripts.measured.measured(policies.KIND))
     text = (EVIDENCE / "benchmarks.md").read_text()
-    same = scripts.page.with_tables(text, {"policies": table})
-    assert same == text, "run bench/other_tasks/policies.py --redraw"
+    expected = scripts.page.with_tables(text, {"policies": table})
+    assert text == expected, "run bench/other_tasks/policies.py --redraw"
 
 
 def test_every_stored_curve_is_complete(scripts):
@@ -78,12 +79,10 @@ def test_every_stored_curve_is_complete(scripts):
     assert all((case, scripts.report.OURS) in curves for case in scripts.report.GOALS)
 
 
-def quick(spec, case):
-    """The study in 40 steps, but for those that learn in pieces of their own."""
-    budget = spec.budget.replace(steps=40)
-    return spec.replace(
-        budget=budget, protocol=spec.protocol.replace(evaluate_every=20, evaluation_episodes=1)
-    )
+def of_40_steps(spec):
+    """Return a specification with 40 steps, and an evaluation of an episode after each 20."""
+    protocol = spec.protocol.replace(evaluate_every=20, evaluation_episodes=1)
+    return spec.replace(budget=spec.budget.replace(steps=40), protocol=protocol)
 
 
 PHYSICS = {
@@ -94,22 +93,22 @@ PHYSICS = {
 
 
 def test_every_agent_of_the_study_learns_40_steps(scripts, monkeypatch):
-    """The study as specified but for its budget: those that need no other library."""
     monkeypatch.setattr(scripts.studies, "N_MILESTONE_EPISODES", 2)
     study, tried = scripts.study, set()
     for (case, variant), combination in study.combinations.items():
-        if variant in {*tried, "sac", "td3", "ppo"} or case in PHYSICS:
+        if variant in {*tried, "sac", "td3", "ppo"} or case in PHYSICS:  # need other libraries
             continue
         tried.add(variant)
-        spec = quick(combination.spec, case)
+        spec = of_40_steps(combination.spec)
         key = study.keys(case, variant)[0]._replace(config_hash=spec.config_hash)
         planned = scripts.studies.PlannedTrial(key, spec)
         record, curve = scripts.studies.learn(planned, lambda done: None)
         assert curve["steps"] == [20, 40]
+        # Evaluations after 20 and 40 steps, and one at the end.
         assert record.rows.table["kind"].tolist() == 3 * ["evaluation"]
         assert np.round(record.rows.episode_return, 2).tolist() == curve["mean_return"]
         assert curve["bytes"] > 0
-    assert len(tried) == 11, "the agents that need no other library"
+    assert len(tried) == 11
 
 
 def test_a_stored_trial_is_not_run_again(scripts, tmp_path):
@@ -135,7 +134,7 @@ def test_a_stored_trial_is_not_run_again(scripts, tmp_path):
     assert curves == first_curves, "with processor times, which a second run would change"
 
 
-def test_tables_of_two_hand_made_trials_are_as_worked_by_hand(scripts):
+def test_tables_of_hand_made_trials_are_as_worked_by_hand(scripts):
     def trial(*returns):
         steps = [10_000, 20_000, 50_000][: len(returns)]
         return {"steps": steps, "mean_return": returns, "cpu_seconds": [1.0] * 3, "bytes": 2048}
@@ -164,16 +163,16 @@ def test_tables_of_two_hand_made_trials_are_as_worked_by_hand(scripts):
 def test_processor_time_excludes_evaluations(scripts, monkeypatch):
     monkeypatch.setattr(scripts.studies, "N_MILESTONE_EPISODES", 2)
 
-    class Slow(gym.Wrapper):
+    class TakesMilliseconds(gym.Wrapper):
         def step(self, action):
             began = time.process_time()
             while time.process_time() < began + 0.001:
                 pass
             return super().step(action)
 
-    spec = quick(scripts.study.combinations["Pendulum", "stream-q"].spec, "Pendulum")
+    spec = of_40_steps(scripts.study.combinations["Pendulum", "stream-q"].spec)
     trial = spec.make_trial(1)
-    trial.training.evaluation_env = Slow(trial.training.evaluation_env)
+    trial.training.evaluation_env = TakesMilliseconds(trial.training.evaluation_env)
     clock = scripts.studies.Clock(trial.training)
     began = time.process_time()
     trial.training.run()
@@ -191,7 +190,8 @@ def test_a_failed_measurement_does_not_stop_others_or_change_the_packed_store(
     squares = measured.measured("squares", tmp_path)
     assert {key: row["square"] for key, row in squares.items()} == {("a", 1): 1, ("a b", 2): 4}
     assert [file.name for file in tmp_path.iterdir()] == [measured.PACKED]
-    measured.measure_missing("squares", abs, keys, options_of(tmp_path))  # which would fail
+    # Stored keys are not measured again: `abs` would fail.
+    measured.measure_missing("squares", abs, keys, options_of(tmp_path))
     assert measured.measured("squares", tmp_path) == squares
     packed = (tmp_path / measured.PACKED).read_bytes()
     with contextlib.suppress(RuntimeError), measured.opened(tmp_path) as store:
@@ -203,7 +203,7 @@ def test_a_failed_measurement_does_not_stop_others_or_change_the_packed_store(
 
 def test_a_process_that_exits_is_reported_with_its_code(scripts, tmp_path, capsys):
     measured = scripts.measured
-    keys = [("x", 0), ("x", 3)]
+    keys = [("x", 0), ("x", 3)]  # the first one's process exits with code 3
     measured.measure_missing("squares", squared, keys, options_of(tmp_path, jobs=2), apart=True)
     assert "ended with 3" in capsys.readouterr().err
     assert list(measured.measured("squares", tmp_path)) == [("x", 3)]
@@ -236,88 +236,101 @@ def test_an_unreached_target_is_written_as_never(scripts):
     assert scripts.page.interval(estimate, 1) == "1,234.5 [1.0, never]"
 
 
+def sensors(task, **options):
+    return gym.make("bench/Sensors-v0", task=task, **options)
+
+
+def rollout(env, actions, seed=3):
+    """Return the observations of an episode."""
+    return [env.reset(seed=seed)[0], *(env.step(action)[0] for action in actions)]
+
+
 def test_sensor_wrappers_have_the_stated_noise_and_correlation(scripts):
-    options = {"task": "CartPole-v1", "noise": 0.1, "copies": 2, "irrelevant": 3}
-    env = gym.make("bench/Sensors-v0", correlation=0.95, **options)
+    env = sensors("CartPole-v1", noise=0.1, copies=2, irrelevant=3, correlation=0.95)
+    # Four variables and two copies of each, then the irrelevant ones.
     assert env.observation_space.shape == (4 * 3 + 3,)
-    first = [env.reset(seed=5)[0], *(env.step(i % 2)[0] for i in range(8))]
-    again = [env.reset(seed=5)[0], *(env.step(i % 2)[0] for i in range(8))]
-    assert np.array_equal(first, again)
-    observations = []
-    for seed in range(300):
-        observations.append(env.reset(seed=seed)[0])
-        observations += [env.step(i % 2)[0] for i in range(8)]
-    observations = np.array(observations).reshape(300, 1 + 8, 4 * 3 + 3)
+    actions = [0, 1] * 4
+    assert np.array_equal(rollout(env, actions, seed=5), rollout(env, actions, seed=5))
+    observations = np.array([rollout(env, actions, seed) for seed in range(300)])
     # Noise of a copy in the units of a variable: a tenth of its range, 4.8 for the position.
-    apart = (observations[:, :, 0] - observations[:, :, 4]) / np.sqrt(2)
-    assert apart.std() == pytest.approx(0.48, rel=0.05)
+    differences = observations[:, :, 0] - observations[:, :, 4]
+    assert differences.std() == pytest.approx(np.sqrt(2) * 0.48, rel=0.05)
     irrelevant = observations[:, :, 12:]
     assert irrelevant.std() == pytest.approx(1.0, rel=0.1)
-    pairs = irrelevant[:, :-1].ravel(), irrelevant[:, 1:].ravel()
-    assert np.corrcoef(*pairs)[0, 1] == pytest.approx(0.95, abs=0.02)
-    plain = gym.make("bench/Sensors-v0", task="Pendulum-v1", irrelevant=2)
-    observation, _ = plain.reset(seed=1)
+    consecutive = irrelevant[:, :-1].ravel(), irrelevant[:, 1:].ravel()
+    assert np.corrcoef(*consecutive)[0, 1] == pytest.approx(0.95, abs=0.02)
+
+
+def test_sensor_wrappers_add_irrelevant_variables_after_those_of_the_task(scripts):
+    observation, _ = sensors("Pendulum-v1", irrelevant=2).reset(seed=1)
     assert np.array_equal(observation[:3], gym.make("Pendulum-v1").reset(seed=1)[0])
     assert np.all(np.abs(observation[3:]) < 1)
 
 
-def test_wrappers_hide_variables_delay_actions_and_leave_the_goals_reward(scripts):
-    def rollout(env, actions, seed=3):
-        return [env.reset(seed=seed)[0], *(env.step(a)[0] for a in actions)]
+def test_sensor_wrappers_hide_variables_and_delay_actions(scripts):
+    cartpole = gym.make("CartPole-v1")
+    positions = rollout(sensors("CartPole-v1", hidden=[1, 3]), [1, 1, 0])
+    assert np.array_equal(positions, np.array(rollout(cartpole, [1, 1, 0]))[:, [0, 2]])
+    noisy = rollout(sensors("CartPole-v1", hidden=[1, 3], noise=0.05), [1, 1, 0])
+    assert 0.01 < np.abs(np.subtract(noisy, positions)).max() < 1
+    delayed = rollout(sensors("CartPole-v1", delay=2), [1, 1, 0, 0])
+    assert np.array_equal(delayed, rollout(cartpole, [0, 0, 1, 1])), "two steps of action 0 first"
 
-    usual = gym.make("CartPole-v1")
-    shown = rollout(gym.make("bench/Sensors-v0", task="CartPole-v1", hidden=[1, 3]), [1, 1, 0])
-    assert np.array_equal(shown, np.array(rollout(usual, [1, 1, 0]))[:, [0, 2]])
-    noisy = gym.make("bench/Sensors-v0", task="CartPole-v1", hidden=[1, 3], noise=0.05)
-    assert 0.01 < np.abs(np.subtract(rollout(noisy, [1, 1, 0]), shown)).max() < 1
-    late = rollout(gym.make("bench/Sensors-v0", task="CartPole-v1", delay=2), [1, 1, 0, 0])
-    assert np.array_equal(late, rollout(usual, [0, 0, 1, 1]))  # two steps of action 0 come first
 
-    hill = gym.make("bench/Sensors-v0", task="MountainCar-v0", goal_only=True)
-    observation, _ = hill.reset(seed=1)
+def test_a_goal_only_task_has_a_reward_of_1_at_its_goal_and_no_other(scripts):
+    env = sensors("MountainCar-v0", goal_only=True)
+    observation, _ = env.reset(seed=1)
     rewards, terminated = [], False
     while not terminated:  # a push along the velocity reaches the goal
-        observation, reward, terminated, _, _ = hill.step(2 if observation[1] >= 0 else 0)
+        observation, reward, terminated, _, _ = env.step(2 if observation[1] >= 0 else 0)
         rewards.append(reward)
     assert rewards == [0.0] * (len(rewards) - 1) + [1.0]
 
 
 def test_an_endless_task_has_episodes_in_evaluations_only(scripts):
-    spec = scripts.study.combinations["Pendulum endless", "q-lambda-auto"].spec
-    spec = quick(spec, "Pendulum").replace(budget=spec.budget.replace(steps=600))
-    trial = spec.replace(protocol=spec.protocol.replace(evaluate_every=600)).make_trial(1)
+    spec = of_40_steps(scripts.study.combinations["Pendulum endless", "q-lambda-auto"].spec)
+    protocol, budget = spec.protocol.replace(evaluate_every=600), spec.budget.replace(steps=600)
+    trial = spec.replace(protocol=protocol, budget=budget).make_trial(1)
     clock = scripts.studies.Clock(trial.training)
     trial.training.run()
     assert clock.curve["steps"] == [600]
-    rows = [row for row in trial.training.rows if row["kind"] == "episode"]
-    assert not rows, "training has no end"
-    assert -200 * 17 < clock.curve["mean_return"][0] < 0, "200 steps at most 16.3 each"
+    assert not any(row["kind"] == "episode" for row in trial.training.rows)
+    # An episode of the evaluation has 200 steps, each with a cost of at most 16.3.
+    assert -200 * 16.3 < clock.curve["mean_return"][0] < 0
 
 
 def test_cells_end_in_the_opposite_corner_after_the_shortest_path_along_the_borders(scripts):
-    right, up, down = 0, 2, 3  # cells are numbered from 0 to 99, by rows of 10
-    env = gym.make("bench/Cells-v0")
+    right, up, down = 0, 2, 3  # actions
+    env = gym.make("bench/Cells-v0")  # one-hot vectors of cells 0 to 99, by rows of 10
     assert env.reset(seed=1)[0].nonzero()[0].tolist() == [0]
-    assert env.step(down)[0].nonzero()[0].tolist() == [0]  # stays at the border
+    assert env.step(down)[0].nonzero()[0].tolist() == [0], "stays at the border"
     assert env.step(up)[0].nonzero()[0].tolist() == [10]
-    for steps, action in ((8, up), (9, right)):
-        for _ in range(steps):
-            observation, reward, terminated, truncated, _ = env.step(action)
-            assert (reward, truncated, observation.sum()) == (-1.0, False, 1)
-            assert terminated == (observation[99] == 1)
+    for action in [up] * 8 + [right] * 9:
+        observation, reward, terminated, truncated, _ = env.step(action)
+        assert (reward, truncated, observation.sum()) == (-1.0, False, 1)
+        assert terminated == (observation[99] == 1)
     assert terminated
 
 
-def test_tile_codings_of_pairs_hashes_and_tables_have_their_indices(scripts):
+def test_tiles_of_pairs_are_those_of_a_tile_coding_of_each_pair_of_inputs(scripts):
     tiles = sys.modules["tile_coding"]
-    pairs = tiles.PairTiles(n_inputs=3, n_bins=4, n_tilings=2)
-    joint = tiles.TileCoding(n_inputs=2, n_bins=4, n_tilings=2)
-    assert pairs.n_tiles == 3 * joint.n_tiles
-    unit = np.array([0.1, 0.5, 0.9])
+    of_pairs = tiles.PairTiles(n_inputs=3, n_bins=4, n_tilings=2)
+    of_two = tiles.TileCoding(n_inputs=2, n_bins=4, n_tilings=2)
+    assert of_pairs.n_tiles == 3 * of_two.n_tiles
+    state = np.array([0.1, 0.5, 0.9])
     expected = [
-        joint(unit[[a, b]]) + n * joint.n_tiles for n, (a, b) in enumerate([(0, 1), (0, 2), (1, 2)])
+        of_two(state[list(pair)]) + number * of_two.n_tiles
+        for number, pair in enumerate([(0, 1), (0, 2), (1, 2)])
     ]
-    assert pairs(unit).tolist() == np.concatenate(expected).tolist()
+    assert of_pairs(state).tolist() == np.concatenate(expected).tolist()
+
+
+def test_a_table_has_a_tile_for_each_discrete_observation(scripts):
+    assert sys.modules["tile_coding"].Table(5)(3).tolist() == [3]
+
+
+def test_hashed_tiles_have_an_index_for_each_tiling_with_few_collisions(scripts):
+    tiles = sys.modules["tile_coding"]
     hashed = tiles.HashedTiles(n_inputs=12, n_bins=8, n_tilings=16, n_tiles=1000)
     points = np.random.default_rng(1).random((50, 12))
     indices = np.array([hashed(point) for point in points])
@@ -327,7 +340,6 @@ def test_tile_codings_of_pairs_hashes_and_tables_have_their_indices(scripts):
     # 50 * 16 random numbers below 1,000 have 1000 * (1 - e^-0.8) = 551 different values.
     assert len(np.unique(indices)) > 400
     assert hashed(points[0]).tolist() == hashed(points[0] + 1e-6).tolist()
-    assert tiles.Table(5)(3).tolist() == [3]
 
 
 @pytest.mark.parametrize(
@@ -339,7 +351,7 @@ def test_tile_codings_of_pairs_hashes_and_tables_have_their_indices(scripts):
     ],
 )
 def test_swift_sarsa_has_the_values_of_its_reference_implementation(scripts, settings, values):
-    """SwiftTDBinaryFeatures, compiled with doubles, after 10, 100, 1,000 and 3,000 steps."""
+    # Values are those of the authors' SwiftTDBinaryFeatures, compiled with doubles.
     tiles = sys.modules["tile_coding"]
     names = ("step_size", "meta_step_size", "largest_rate", "step_size_decay")
     learning = tiles.SwiftConfig(**dict(zip(names, settings, strict=True)))
@@ -347,15 +359,15 @@ def test_swift_sarsa_has_the_values_of_its_reference_implementation(scripts, set
     sizes = tiles.TilesConfig(n_bins=4, n_tilings=4)
     agent = tiles.SwiftSarsa(*spaces, approximator=sizes, learning=learning, seed=1)
     agent.begin_episode()
-    random, learned = np.random.default_rng(0), []
-    for _ in range(3000):
-        active = np.sort(random.choice(40, 4, replace=False))
-        agent.step(active, float(active[0] < 5))
-        learned.append(agent._value)
-    assert [learned[n] for n in (9, 99, 999, 2999)] == pytest.approx(values, rel=1e-8)
+    random, value_after = np.random.default_rng(0), {}
+    for n_steps in range(1, 3001):
+        active_tiles = np.sort(random.choice(40, 4, replace=False))
+        agent.step(active_tiles, float(active_tiles[0] < 5))
+        value_after[n_steps] = agent._value
+    assert [value_after[n] for n in (10, 100, 1000, 3000)] == pytest.approx(values, rel=1e-8)
 
 
-def test_stream_q_follows_the_gradient_of_its_value(scripts):
+def test_stream_q_moves_parameters_along_the_gradient_of_the_value_of_the_action(scripts):
     streaming = sys.modules["streaming"]
     env = gym.make("Pendulum-v1")
     spaces = env.observation_space, env.action_space
@@ -363,29 +375,26 @@ def test_stream_q_follows_the_gradient_of_its_value(scripts):
     agent.progress = 1.0
     observation, _ = env.reset(seed=1)
     agent.begin_episode()
-    for n in range(200):
+    for step in range(200):
         action = agent.act(observation)
-        following, reward, *_ = env.step(action)
-        if n > 20 and agent._is_greedy:
+        next_observation, reward, *_ = env.step(action)
+        if step > 20 and agent._is_greedy:
             break
-        agent.learn(Transition(observation, action, reward, following, False))
-        observation = following
-    (network,), agent_action = agent.networks, agent._chosen
-    network.end_episode()
+        agent.learn(Transition(observation, action, reward, next_observation, False))
+        observation = next_observation
+    (network,), chosen = agent.networks, agent._chosen
+    network.end_episode()  # without traces of earlier steps
     state, before = agent._state.copy(), network.parameters.copy()
-    agent.learn(Transition(observation, action, reward, following, False))
-    agent.act(following)
-    moved = network.parameters - before
-    network.parameters[:] = before
-    largest = np.argsort(-np.abs(moved))[:20]
-    slopes = []
-    for parameter in largest:
-        values = []
-        for change in (1e-3, -1e-3):
-            network.parameters[parameter] = before[parameter] + change
-            values.append(float(network.outputs(state)[agent_action]))
-        network.parameters[parameter] = before[parameter]
-        slopes.append((values[0] - values[1]) / 2e-3)
-    # Each parameter moves in proportion to its slope, up to the error of finite differences.
-    ratios = moved[largest] / np.array(slopes)
-    assert np.allclose(ratios, np.median(ratios), rtol=0.05)
+    agent.learn(Transition(observation, action, reward, next_observation, False))
+    agent.act(next_observation)  # with the next action, the transition is learned
+    changes = network.parameters - before
+
+    def value_with(parameter, change):
+        network.parameters[:] = before
+        network.parameters[parameter] += change
+        return float(network.outputs(state)[chosen])
+
+    largest = np.argsort(-np.abs(changes))[:20]
+    gradient = [(value_with(i, 1e-3) - value_with(i, -1e-3)) / 2e-3 for i in largest]
+    ratios = changes[largest] / gradient
+    assert np.allclose(ratios, np.median(ratios), rtol=0.05)  # finite differences are not exact

@@ -24,39 +24,41 @@ def packed_store():
         sys.modules.pop("packed_store", None)
 
 
-def record(trial, returns, **about):
-    made = make_record(trial, steps=range(48, 48 + len(returns)), returns=returns, **about)
-    return replace(made, key=made.key._replace(seed=2**64 - 1 - trial), seconds=0.1 + trial)
+def new_record(trial, returns, **about):
+    """Return a stored trial with some returns, a seed of 64 bits and a fraction of seconds."""
+    record = make_record(trial, steps=range(48, 48 + len(returns)), returns=returns, **about)
+    return replace(record, key=record.key._replace(seed=2**64 - 1 - trial), seconds=0.1 + trial)
 
 
-def content(folder):
+def content_of(folder):
     with ResultStore(folder, read_only=True) as store:
-        runs = [(replace(r, rows=None), r.rows.checksum()) for r in store.load()]
-        return runs, store.measurements("squares"), store.measurements("cubes")
+        trials = [(replace(record, rows=None), record.rows.checksum()) for record in store.load()]
+        return trials, store.measurements("squares"), store.measurements("cubes")
 
 
 @pytest.mark.parametrize(
-    "returns", [[10, -5, -250, 0], [0.1, -0.3, 1e300, 5.0], [2.0**60, 1, 0, 3]]
+    "returns",
+    [[10, -5, -250, 0], [0.1, -0.3, 1e300, 5.0], [2.0**60, 1, 0, 3]],
+    ids=["integers", "fractions", "large integers"],
 )
 def test_a_packed_store_is_unpacked_unchanged(packed_store, tmp_path, returns):
     with ResultStore(tmp_path / "original") as store:
-        store.add(record(1, returns, version="0.0.9"))
-        store.add(record(0, returns[::-1], finished_at="2026-11-26T00:00:00+00:00"))
-        store.add(record(2, []))
+        store.add(new_record(1, returns, version="0.0.9"))
+        store.add(new_record(0, returns[::-1], finished_at="2026-11-26T00:00:00+00:00"))
+        store.add(new_record(2, []))
         store.put("squares", '["a", 1]', {"square": 0.1 + 0.2})
         store.put("cubes", "[2]", {"cube": [8, None]})
     packed = packed_store.pack(tmp_path / "original")
     packed_store.unpack(packed, tmp_path / "unpacked")
-    assert content(tmp_path / "unpacked") == content(tmp_path / "original")
+    assert content_of(tmp_path / "unpacked") == content_of(tmp_path / "original")
     assert packed_store.pack(tmp_path / "unpacked") == packed
     assert [file.name for file in (tmp_path / "unpacked").iterdir()] == ["results.sqlite"]
 
 
 def test_unpacking_does_not_overwrite_results(packed_store, tmp_path):
     with ResultStore(tmp_path) as store:
-        store.add(record(0, [1.0]))
-    before = content(tmp_path)
+        store.add(new_record(0, [1.0]))
+    before = content_of(tmp_path)
     with pytest.raises(FileExistsError, match="choose another folder"):
         packed_store.unpack(packed_store.pack(tmp_path), tmp_path)
-    assert content(tmp_path) == before
-    assert packed_store.pack(tmp_path)
+    assert content_of(tmp_path) == before

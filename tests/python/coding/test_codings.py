@@ -1,4 +1,4 @@
-"""Codings: bins, patterns, and correlations as they should be."""
+"""Codings: values have bins, bins have patterns of signs, patterns have correlations."""
 
 import dataclasses
 import json
@@ -25,7 +25,7 @@ from sdnn.coding.numeric import MAX_KNOTS, quantile_knots
 
 UNIT = np.array([0.0, 1.0])
 LETTERS = np.array(["c", "a", "b", "a"])
-LIKE = np.array([[1.0, 0.5, 0.0], [0.5, 1.0, 0.5], [0.0, 0.5, 1.0]])
+CORRELATIONS = np.array([[1.0, 0.5, 0.0], [0.5, 1.0, 0.5], [0.0, 0.5, 1.0]])
 
 FITTED = {
     "random-inverse": RandomInverse(length_scale=0.2).fit(UNIT, 400),
@@ -35,7 +35,7 @@ FITTED = {
     "circular of two": Circular(n_anchor_patterns=3, n_interpolated=9).fit(UNIT, 400),
     "circular of one": Circular(n_anchor_patterns=2, n_interpolated=9).fit(UNIT, 400),
     "symbolic": Symbolic().fit(LETTERS, 400),
-    "correlation-matrix": CorrelationMatrix(matrix=LIKE).fit(LETTERS, 400),
+    "correlation-matrix": CorrelationMatrix(matrix=CORRELATIONS).fit(LETTERS, 400),
     "with missing": WithMissing(base=RandomInverse(length_scale=0.2)).fit(UNIT, 400),
     "letters with missing": WithMissing(base=Symbolic()).fit(LETTERS, 400),
 }
@@ -52,10 +52,10 @@ def test_patterns_are_signs_determined_by_the_seed(name):
 
 
 @pytest.mark.parametrize("name", FITTED)
-def test_drawn_patterns_scatter_about_the_expected_correlations(name):
+def test_drawn_patterns_have_the_expected_correlations_up_to_chance(name):
     n_units = 10000
-    coding = dataclasses.replace(FITTED[name])
-    if isinstance(coding, RandomInverse):
+    coding = FITTED[name]
+    if isinstance(coding, RandomInverse):  # with fewer bins than for 10,000 units
         coding = dataclasses.replace(coding, n_flipped=100, n_bins=40)
     drawn = coding.patterns(n_units, 3).astype(float)
     expected = coding.correlations(n_units)
@@ -88,7 +88,7 @@ def test_quantile_bins_hold_equal_shares_of_samples():
 
 
 def test_a_value_between_subnormal_knots_has_the_bin_of_the_next_knot():
-    """The slope between the knots is 0.5 / 1e-323, which is beyond all floats."""
+    # The slope between the knots is 0.5 / 1e-323, which is beyond all floats.
     coding = RandomInverse(spacing="quantile", n_bins=4).fit(np.array([-5e-324, 5e-324, 1.0]), 400)
     assert coding.bins(np.array([-1.0, -5e-324, 0.0, 5e-324, 0.5, 1.0])).tolist() == [
         0, 0, 2, 2, 3, 3,
@@ -114,7 +114,7 @@ def test_bins_are_within_the_table_and_monotonic(values, spacing):
 
 @pytest.mark.parametrize("period", [24.0, 7.0, 2 * np.pi, 0.1])
 def test_circular_bins_repeat_with_the_period_also_at_edges(period):
-    coding, edges = Circular(period=period), np.arange(360) * period / 360
+    coding, edges = Circular(period=period), np.arange(360) * period / 360  # of 360 bins
     for turns in (-1000, -1, 1, 2, 365):
         np.testing.assert_array_equal(coding.bins(edges + turns * period), np.arange(360))
 
@@ -122,17 +122,17 @@ def test_circular_bins_repeat_with_the_period_also_at_edges(period):
 @pytest.mark.filterwarnings("ignore::sdnn.coding.CoarseCodeWarning")
 @settings(max_examples=100, deadline=None)
 @given(st.integers(1, 4000), st.floats(0.01, 3))
-def test_the_correlation_at_the_length_scale_is_one_over_e(half, length_scale):
-    n_units = 2 * half
+def test_the_correlation_at_the_length_scale_is_one_over_e(half_of_units, length_scale):
+    n_units = 2 * half_of_units
     coding = RandomInverse(length_scale=length_scale).fit(UNIT, n_units)
     correlation = 1 - 4 * coding.n_flipped / n_units  # of neighbouring bins
     if correlation > 0.5 and coding.size > 20 and length_scale < 1:  # else bins are too coarse
-        distance = length_scale * coding.size
-        assert abs(correlation**distance - np.exp(-1)) < 0.1
+        n_bins = length_scale * coding.size  # of the column's range from 0 to 1
+        assert abs(correlation**n_bins - np.exp(-1)) < 0.1
 
 
 @pytest.mark.parametrize("name", FITTED)
-def test_codings_equal_their_copies_through_json(name):
+def test_codings_read_from_json_equal_those_that_were_written(name):
     coding = FITTED[name]
     assert from_dict(json.loads(json.dumps(to_dict(coding)))) == coding
 
@@ -147,7 +147,7 @@ def test_codings_are_found_by_name():
 
 
 @pytest.mark.parametrize(
-    ("coding", "error"),
+    ("coding", "setting"),
     [
         (RandomInverse(n_flipped=33), "n_flipped"),
         (RandomInverse(spacing="quantile", low=0.0), "spacing"),
@@ -162,18 +162,18 @@ def test_codings_are_found_by_name():
         (CorrelationMatrix(matrix=np.eye(2), categories=("a", "b", "c")), "row"),
     ],
 )
-def test_impossible_settings_are_refused_with_their_name(coding, error):
-    refuses(error, coding.fit, UNIT, 64, error=(ValueError, TypeError))
+def test_impossible_settings_are_refused_with_their_name(coding, setting):
+    refuses(setting, coding.fit, UNIT, 64, error=(ValueError, TypeError))
 
 
-def test_mixed_missing_and_unknown_symbols_are_refused():
+def test_mixed_missing_and_unknown_symbols_and_unfitted_codings_are_refused():
     refuses("words", Symbolic().fit, np.array(["a", 1], dtype=object), 64)
     refuses("NaN", Symbolic().fit, np.array([1.0, np.nan]), 64)
     refuses("'d', 'e'", FITTED["symbolic"].bins, np.array(["a", "d", "e", "d"]))
     refuses("fitted", RandomInverse().bins, UNIT)
 
 
-def test_nan_infinity_and_texts_are_refused_as_numbers():
+def test_nan_infinity_and_texts_are_refused_as_numbers_but_infinity_is_clipped_to_ranges():
     for coding in (RandomInverse(), Anchor(), Circular(period=1.0)):
         with pytest.raises(ValueError, match="contains NaN"):
             coding.fit(UNIT, 64).bins(np.array([0.5, np.nan]))
@@ -191,11 +191,11 @@ def test_nan_infinity_and_texts_are_refused_as_numbers():
     "coding", [RandomInverse(), RandomInverse(spacing="quantile"), Anchor(), WithMissing()]
 )
 def test_fitting_a_fitted_coding_does_not_change_it(coding, column):
-    learned = coding.fit(column, 400)
-    assert not learned.learns
-    assert learned.fit(np.array(learned.ends()), 400) == learned
-    if column[0] < column[-1]:
-        assert learned.fit(np.array([7.0, 8.0]), 400) == learned
+    fitted = coding.fit(column, 400)
+    assert not fitted.learns
+    assert fitted.fit(np.array(fitted.ends()), 400) == fitted
+    if column[0] < column[-1]:  # other columns are outside a range of no width
+        assert fitted.fit(np.array([7.0, 8.0]), 400) == fitted
 
 
 @pytest.mark.parametrize(
@@ -227,7 +227,7 @@ def test_knots_of_quantiles_rise_from_rank_0_to_1():
     assert (levels[0], levels[-1]) == (0, 1)
 
 
-def test_missing_and_unknown_values_have_the_last_bin():
+def test_missing_values_and_unknown_symbols_have_an_additional_last_bin():
     numbers = np.array([4.0, None, 0.0, np.nan, pd.NA], dtype=object)
     coding = WithMissing(base=Anchor(n_anchor_patterns=3, n_interpolated=1)).fit(numbers, 8)
     assert (coding.base.low, coding.base.high, coding.size) == (0.0, 4.0, 4 + 1)
@@ -243,7 +243,7 @@ def test_missing_and_unknown_values_have_the_last_bin():
 
 
 @pytest.mark.parametrize(
-    ("coding", "column", "message"),
+    ("coding", "column", "named"),
     [
         (WithMissing(unknown="ignore"), UNIT, "unknown"),
         (WithMissing(base=WithMissing()), UNIT, "base"),
@@ -253,8 +253,8 @@ def test_missing_and_unknown_values_have_the_last_bin():
         (WithMissing(), np.array(["a", None], dtype=object), "convert"),
     ],
 )
-def test_impossible_codings_with_missing_values_are_refused(coding, column, message):
-    refuses(message, coding.fit, column, 8)
+def test_impossible_codings_with_missing_values_are_refused(coding, column, named):
+    refuses(named, coding.fit, column, 8)
 
 
 def test_with_unknown_error_unknown_categories_are_refused():

@@ -1,4 +1,4 @@
-"""The kernel is the limit of the codes, and the pictures can be drawn."""
+"""The kernel: the limit of normalized inner products of codes with many units."""
 
 import numpy as np
 import pytest
@@ -20,8 +20,8 @@ def test_inner_products_of_long_codes_approach_the_kernel(coding, pairs):
     )
     model.fit(X, X[:, 0])
     code = model.transform_code(X).astype(float)
-    # A pair gives half its units, a plain pattern all of them.
-    n_active = n_units / 2 * sum(2 if mu == nu else 1 for mu, nu in model.pairs_)
+    # Half the units of a pair of inputs are active, and all of an input that is without a pair.
+    n_active = n_units / 2 * sum(2 if first == second else 1 for first, second in model.pairs_)
     limit = kernel.AnalyticKernel(model.codings_, pairs=model.pairs_, n_units=n_units)(X)
     # Means over 20,000 random units have a standard deviation of about 0.007.
     assert np.abs(code @ code.T / n_active - limit).max() < 0.03
@@ -33,7 +33,9 @@ def test_the_kernel_of_one_and_two_inputs_is_as_worked_by_hand():
     coding = RandomInverse(n_bins=11, n_flipped=10, low=0.0, high=1.0)
     rho = 1 - 4 * 10 / 100  # correlation of neighbouring bins; of bins at distance 2, rho^2
     of_two = kernel.AnalyticKernel(coding, n_inputs=2, n_units=100)
+    # One bin apart in the first input; then also two bins apart in the second one.
     matrix = of_two(np.array([[0.05, 0.05]]), np.array([[0.15, 0.05], [0.15, 0.25]]))
+    # The mean of both orders of a pair: (1 + correlation of one) / 2 * correlation of the other.
     expected = [((1 + rho) / 2 + rho) / 2, ((1 + rho) / 2 * rho**2 + (1 + rho**2) / 2 * rho) / 2]
     np.testing.assert_allclose(matrix, [expected])
     of_one = kernel.AnalyticKernel(coding, n_inputs=1, n_units=100)
@@ -54,18 +56,19 @@ COLUMNS = {"different": RANDOM.lognormal(0, 2, 30), "equal": np.full(30, 3.5)}
         WithMissing(base=RandomInverse(spacing="quantile")),
     ],
 )
-def test_the_kernel_uses_fitted_codings_unchanged(coding, column):
-    learned = coding.fit(COLUMNS[column], 400)
-    analytic = kernel.AnalyticKernel([learned, learned], n_units=400)
-    assert analytic.codings == (learned, learned)
-    samples = np.stack([COLUMNS[column]] * 2, axis=1)
-    rho = learned.correlations(400)[np.ix_(*[learned.bins(COLUMNS[column])] * 2)]
+def test_the_kernel_and_similarities_use_fitted_codings_unchanged(coding, column):
+    fitted = coding.fit(COLUMNS[column], 400)
+    analytic = kernel.AnalyticKernel([fitted, fitted], n_units=400)
+    assert analytic.codings == (fitted, fitted)
+    samples = np.stack([COLUMNS[column]] * 2, axis=1)  # both inputs are equal
+    bins = fitted.bins(COLUMNS[column])
+    rho = fitted.correlations(400)[np.ix_(bins, bins)]
     np.testing.assert_allclose(analytic(samples), (1 + rho) / 2 * rho)
-    assert kernel.similarity(learned, 400).shape == (learned.size, learned.size)
-    assert kernel.plot_similarity(learned, 400) is not None
+    assert kernel.similarity(fitted, 400).shape == (fitted.size, fitted.size)
+    assert kernel.plot_similarity(fitted, 400) is not None
 
 
-def test_similarities_of_drawn_patterns_are_near_the_correlations():
+def test_similarities_of_drawn_patterns_are_near_the_expected_correlations():
     for coding in ("random-inverse", "anchor", "circular", Symbolic(categories=("a", "b"))):
         drawn, expected = kernel.similarity(coding, 4000, 1), kernel.correlations(coding, 4000)
         assert drawn.shape == expected.shape
@@ -79,8 +82,8 @@ def test_plot_similarity_draws_a_picture(coding, tmp_path):
     assert (tmp_path / "similarity.png").stat().st_size > 5000
 
 
-@pytest.mark.parametrize("bad", [np.zeros((3, 1)), np.zeros((3, 3)), np.zeros(2)])
-def test_samples_of_another_number_of_inputs_are_refused(bad):
+@pytest.mark.parametrize("samples", [np.zeros((3, 1)), np.zeros((3, 3)), np.zeros(2)])
+def test_samples_of_another_number_of_inputs_are_refused(samples):
     analytic = kernel.AnalyticKernel("anchor", n_inputs=2)
-    refuses("X", analytic, bad)
-    refuses("Y", analytic, np.zeros((1, 2)), bad)
+    refuses("X", analytic, samples)
+    refuses("Y", analytic, np.zeros((1, 2)), samples)
