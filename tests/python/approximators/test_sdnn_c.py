@@ -233,7 +233,7 @@ def test_averaged_weights_are_a_moving_average_of_snapshots():
         next_snapshot, n_snapshots = n_steps + interval, n_snapshots + 1
         if n_snapshots % 25:
             continue
-        # The core's averages have fractions of thousandths, and are rounded to integers.
+        # The averages of the core are exact to some thousandths, and then rounded to integers.
         np.testing.assert_allclose(network.averaged_weights(), weights, atol=0.51)
         np.testing.assert_allclose(network.averaged_thresholds(), thresholds, atol=0.51)
         other.set_parameters(network.averaged_weights(), network.averaged_thresholds())

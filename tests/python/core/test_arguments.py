@@ -26,23 +26,23 @@ def test_real_accepts_numbers_of_python_and_numpy(value):
 
 
 @pytest.mark.parametrize(
-    ("check", "problem"),
+    ("check", "values", "problem"),
     [
-        (lambda: arguments.whole("one", 0, 1, 2), "must be a whole number in [1, 2], got 0"),
-        (lambda: arguments.real("one", "x"), "must be a number, got 'x'"),
-        (lambda: arguments.flag("one", 5), "must be True or False, got 5"),
-        (lambda: arguments.path_of("one", None), "must be the name of a file, got None"),
-        (lambda: arguments.array_of("one", ["a"]), "must be numbers, got ['a']"),
+        (arguments.whole, (0, 1, 2), "must be a whole number in [1, 2], got 0"),
+        (arguments.real, ("x",), "must be a number, got 'x'"),
+        (arguments.flag, (5,), "must be True or False, got 5"),
+        (arguments.path_of, (None,), "must be the name of a file, got None"),
+        (arguments.array_of, (["a"],), "must be numbers, got ['a']"),
     ],
 )
-def test_errors_of_checks_carry_argument_and_problem(check, problem):
+def test_errors_of_checks_carry_argument_and_problem(check, values, problem):
     with pytest.raises((TypeError, ValueError)) as caught:
-        check()
-    assert arguments.blamed(caught.value) == ("one", problem)
+        check("size", *values)
+    assert arguments.blamed(caught.value) == ("size", problem)
 
 
 @pytest.mark.parametrize(
-    ("make", "argument"),
+    ("construct", "argument"),
     [
         (lambda: SDNNCConfig(n_hidden_units=-1), "n_hidden_units"),
         (lambda: SDNNCConfig(circular=5), "circular"),
@@ -51,8 +51,8 @@ def test_errors_of_checks_carry_argument_and_problem(check, problem):
         (lambda: SDNNQLearning(BOX, gym.spaces.Discrete(5000)), "n_actions"),
     ],
 )
-def test_errors_of_the_core_carry_the_argument(make, argument):
+def test_errors_of_the_core_carry_the_argument(construct, argument):
     with pytest.raises((TypeError, ValueError)) as caught:
-        make()
+        construct()
     assert caught.value.argument == argument
     assert argument in str(caught.value)

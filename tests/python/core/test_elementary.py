@@ -13,28 +13,29 @@ def precision():
         yield
 
 
-def worst_ulp(got, exact):
-    """The largest error in units of the last place of the exact value."""
-    return max(
-        float(abs(mpmath.mpf(float(g)) - e) / mpmath.mpf(float(np.spacing(abs(float(e))))))
-        for g, e in zip(got, exact, strict=True)
-    )
+def largest_error(results, function, *arguments):
+    """Return the largest error in units of the last place of the exact value."""
+    errors = []
+    for result, *numbers in zip(results, *arguments, strict=True):
+        exact = function(*(mpmath.mpf(float(number)) for number in numbers))
+        errors.append(abs(mpmath.mpf(float(result)) - exact) / np.spacing(abs(float(exact))))
+    return max(errors)
 
 
-def arguments(limit, n, seed):
-    """Uniform numbers, and neighbours of multiples of pi/2, where digits cancel."""
+def angles_up_to(limit, n, seed):
+    """Return uniform angles, and neighbours of multiples of pi/2, where digits cancel."""
     rng = np.random.default_rng(seed)
     multiples = rng.integers(1, int(limit * 2 / np.pi) + 2, n // 4)
-    near = np.array([float(int(k) * mpmath.pi / 2) for k in multiples])
-    return np.concatenate([rng.uniform(-limit, limit, n), near[near <= limit]])
+    neighbours = np.array([float(int(k) * mpmath.pi / 2) for k in multiples])
+    return np.concatenate([rng.uniform(-limit, limit, n), neighbours[neighbours <= limit]])
 
 
 @pytest.mark.parametrize("limit", [0.8, np.pi, 100.0, 1e5])
 def test_sine_and_cosine_are_within_085_units_of_the_last_place(limit):
-    x = arguments(limit, 4000, seed=1)
+    x = angles_up_to(limit, 4000, seed=1)
     sin, cos = _core.sin_cos(x)
-    assert worst_ulp(sin, [mpmath.sin(mpmath.mpf(float(v))) for v in x]) < 0.85
-    assert worst_ulp(cos, [mpmath.cos(mpmath.mpf(float(v))) for v in x]) < 0.85
+    assert largest_error(sin, mpmath.sin, x) < 0.85
+    assert largest_error(cos, mpmath.cos, x) < 0.85
 
 
 def test_sine_and_cosine_keep_the_shape_of_their_argument():
@@ -52,26 +53,25 @@ def test_the_logarithm_is_within_085_units_of_the_last_place():
             1.0 + rng.uniform(-1e-5, 1e-5, 1000),
         ]
     )
-    assert worst_ulp(_core.log(x), [mpmath.log(mpmath.mpf(float(v))) for v in x]) < 0.85
+    assert largest_error(_core.log(x), mpmath.log, x) < 0.85
 
 
-def test_the_exponential_is_within_07_units_of_the_last_place():
+def test_the_exponential_is_within_07_units_of_the_last_place_or_1_where_it_is_subnormal():
     rng = np.random.default_rng(4)
     x = np.concatenate(
         [rng.uniform(-708.0, 709.7, 3000), rng.uniform(-1.0, 1.0, 4000), rng.uniform(-30, 0, 3000)]
     )
-    assert worst_ulp(_core.exp(x), [mpmath.exp(mpmath.mpf(float(v))) for v in x]) < 0.7
-    subnormal = rng.uniform(-745.0, -708.5, 500)
-    exact = [mpmath.exp(mpmath.mpf(float(v))) for v in subnormal]
-    assert worst_ulp(_core.exp(subnormal), exact) < 1.0
+    assert largest_error(_core.exp(x), mpmath.exp, x) < 0.7
+    x = rng.uniform(-745.0, -708.5, 500)
+    assert largest_error(_core.exp(x), mpmath.exp, x) < 1.0
 
 
 def test_powers_have_relative_errors_that_grow_with_the_logarithm_of_the_result():
     rng = np.random.default_rng(6)
     base, exponent = rng.uniform(0.0, 1.0, 4000), 10.0 ** rng.uniform(-3.0, 2.0, 4000)
-    for b, e, power in zip(base, exponent, _core.power(base, exponent), strict=True):
-        exact = mpmath.mpf(float(b)) ** mpmath.mpf(float(e))
-        if power > 1e-300:
+    for x, y, power in zip(base, exponent, _core.power(base, exponent), strict=True):
+        exact = mpmath.mpf(float(x)) ** mpmath.mpf(float(y))
+        if power > 1e-300:  # not subnormal
             assert abs(float(power) / exact - 1) < (2 + abs(mpmath.log(exact))) * 2.0**-52
 
 
@@ -79,11 +79,9 @@ def test_the_arctangent_is_within_15_units_of_the_last_place():
     rng = np.random.default_rng(5)
     y, x = rng.uniform(-1.0, 1.0, (2, 6000))
     y[:2000] *= 2.0 ** rng.uniform(-300, 300, 2000)
+    # Ratios around 0.5, the centre of the core's reduction.
     y[2000:3000] = 0.5 * np.abs(x[2000:3000]) * (1.0 + rng.uniform(-1e-3, 1e-3, 1000))
-    exact = [
-        mpmath.atan2(mpmath.mpf(float(b)), mpmath.mpf(float(a))) for b, a in zip(y, x, strict=True)
-    ]
-    assert worst_ulp(_core.atan2(y, x), exact) < 1.5
+    assert largest_error(_core.atan2(y, x), mpmath.atan2, y, x) < 1.5
 
 
 def test_normal_quantile_inverts_the_distribution_function():

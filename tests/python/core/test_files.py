@@ -1,4 +1,4 @@
-"""A format for every kind of file: files are read as written, and no damage is missed."""
+"""The format of agents', trainings' and estimators' files: read as written, refused if damaged."""
 
 import json
 import os
@@ -30,7 +30,7 @@ DESCRIPTION = {"words": "é \ud800", "b": {"z": 1, "a": [None, True, 0.1, float(
 
 @pytest.fixture(scope="module")
 def saved(tmp_path_factory):
-    """A file of each kind, as users save it, and a function that reads it."""
+    """The content of a file of each kind, and a function that reads such files."""
     folder = tmp_path_factory.mktemp("saved")
     env = gym.make("Pendulum-v1")
     agent = SDNNQLearning(env.observation_space, env.action_space, approximator=agent_files.SMALL)
@@ -56,19 +56,20 @@ def test_a_file_is_read_exactly_as_written(tmp_path):
     assert arrays.keys() == ARRAYS.keys()
     for name, array in ARRAYS.items():
         np.testing.assert_array_equal(arrays[name], array, strict=True)
-        arrays[name][...] = 7  # they belong to the reader
+        arrays[name][...] = 7  # arrays can be written
     before = path.read_bytes()
-    write_file(path, "agent", *reversed(read_file(path, "agent")))
+    description, arrays = read_file(path, "agent")
+    write_file(path, "agent", arrays, description)
     assert path.read_bytes() == before == with_checksum(before)
 
 
 def test_files_can_be_read_by_safetensors(tmp_path):
     write_file(tmp_path / "file", "estimator", ARRAYS, DESCRIPTION)
     with safe_open(tmp_path / "file", framework="numpy") as file:
-        about = json.loads(file.metadata()["sdnn"])
+        header = json.loads(file.metadata()["sdnn"])
         np.testing.assert_array_equal(file.get_tensor("turned"), ARRAYS["turned"])
-    assert len(about.pop("checksum")) == 8  # 32 bits as hexadecimal digits
-    assert about == {
+    assert len(header.pop("checksum")) == 8  # 32 bits as hexadecimal digits
+    assert header == {
         "kind": "estimator",
         "format": files.FORMAT,
         "version": sdnn.__version__,
@@ -77,12 +78,13 @@ def test_files_can_be_read_by_safetensors(tmp_path):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_readers_refuse_files_of_another_type(saved, kind, tmp_path):
-    path = tmp_path / "other"
+def test_readers_refuse_files_of_another_kind(saved, kind, tmp_path):
+    path = tmp_path / "file"
     path.write_bytes(saved[kind][0])
-    for other, (_, read) in saved.items():
-        if (other, kind) in {(kind, kind), ("agent", "training")}:
-            read(path)  # a training holds an agent
+    for expected_kind, (_, read) in saved.items():
+        # A training's file contains an agent, which can be read from it.
+        if expected_kind == kind or (expected_kind, kind) == ("agent", "training"):
+            read(path)
         else:
             refuses(kind, read, path)
 
@@ -105,7 +107,7 @@ def test_files_of_other_programs_formats_or_checksums_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("part", "other"),
+    ("old", "new"),
     [
         (rb"\"kind\":", rb"\"king\":"),
         (rb"\"description\":{}", rb"\"description\":77"),
@@ -114,12 +116,12 @@ def test_files_of_other_programs_formats_or_checksums_are_refused(tmp_path):
         (b"[1,2]", b"[1,3]"),
     ],
 )
-def test_invalid_content_is_refused_despite_a_valid_checksum(part, other, tmp_path):
+def test_invalid_content_is_refused_despite_a_valid_checksum(old, new, tmp_path):
     path = tmp_path / "crafted"
     write_file(path, "agent", ARRAYS, {})
     content = path.read_bytes()
-    assert part in content
-    path.write_bytes(with_checksum(content.replace(part, other)))
+    assert old in content
+    path.write_bytes(with_checksum(content.replace(old, new)))
     refuses("crafted", read_file, path, "agent")
 
 

@@ -1,4 +1,4 @@
-"""Files made to harm: every reader refuses them at once, by name, and none is written through."""
+"""Malicious and damaged files: readers refuse them by name, and links to other files are kept."""
 
 import os
 import sqlite3
@@ -29,7 +29,7 @@ RUN = RunSpec(
     protocol={"evaluate_every": 10, "evaluation_episodes": 1},
 )
 
-TRAINED = [
+EPISODE_ROWS = [
     {"kind": "episode", "step": 3 * n, "episode": n, "return": -1.5, "length": 3,
      "terminated": True}
     for n in range(40)
@@ -37,24 +37,24 @@ TRAINED = [
 
 
 def make_store(folder):
-    """Finished trials, one in progress, and measurements."""
+    """Make a store of 4 finished trials, a training in progress and a measurement."""
     with ResultStore(folder) as store:
         for trial in range(4):
             store.add(make_record(trial, steps=range(1, 40)))
         key = make_record(7).key
-        rows = TrialRows.from_training(TRAINED)
+        rows = TrialRows.from_training(EPISODE_ROWS)
         store.extend(key, rows, 0, config="{}", version="0.1")
         store.put("cost", "a", {"value": [1, None]})
         return store.path
 
 
 def content_of(folder, **options):
-    """Everything that a store gives."""
+    """Return all that can be read from a store."""
     with ResultStore(folder, **options) as store:
         records = store.load()
         return (
-            [replace(r, rows=None) for r in records],
-            [r.rows.table.tolist() for r in records],
+            [replace(record, rows=None) for record in records],
+            [record.rows.table.tolist() for record in records],
             store.rows(make_record(7).key).table.tolist(),
             store.keys(),
             store.seconds(),
@@ -62,28 +62,29 @@ def content_of(folder, **options):
         )
 
 
-def test_flipped_bits_of_a_store_are_noticed_or_harmless(tmp_path):
+def test_a_flipped_bit_of_a_store_is_noticed_or_changes_nothing_that_is_read(tmp_path):
     path = make_store(tmp_path)
     content, expected = path.read_bytes(), content_of(tmp_path)
     rng = np.random.default_rng(5)
     n_noticed = 0
-    for place in rng.integers(0, len(content), 300):
+    for position in rng.integers(0, len(content), 300):
         flipped = bytearray(content)
-        flipped[place] ^= 1 << int(rng.integers(8))
+        flipped[position] ^= 1 << int(rng.integers(8))
         path.write_bytes(flipped)
         try:
             read = content_of(tmp_path)
         except StoreError as error:
             n_noticed += str(path) in str(error)
         else:
-            assert read == expected, "a bit of no meaning"
+            assert read == expected
     assert n_noticed > 50, "of 300 bits, many of which lie in unused parts of pages"
+
+
+def test_half_a_store_is_refused_as_damaged(tmp_path):
+    path = make_store(tmp_path)
+    content = path.read_bytes()
     path.write_bytes(content[: len(content) // 2])
     refuses("damaged", ResultStore, tmp_path, error=StoreError)
-
-
-def crc_of(values):
-    return zlib.crc32(repr(values).encode())
 
 
 def execute_sql(path, *statements):
@@ -93,6 +94,7 @@ def execute_sql(path, *statements):
 
 
 ENDLESS = "WITH RECURSIVE n(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM n) SELECT"
+"""The begin of a query whose rows never end."""
 
 
 @pytest.mark.parametrize(
@@ -165,16 +167,16 @@ def test_a_stored_configuration_must_have_its_hash(tmp_path):
 
 
 def test_a_journal_rolls_back_but_cannot_remove_other_files(tmp_path):
-    path, victim = make_store(tmp_path), tmp_path / "mine.txt"
+    path, other_file = make_store(tmp_path), tmp_path / "mine.txt"
     expected = content_of(tmp_path)
     journal = hot_journal(path)
     journal_bytes, store_bytes = journal.read_bytes(), path.read_bytes()
     assert content_of(tmp_path) == expected, "rolled back"
     # SQLite removes the file that a journal names as that of a transaction over several files.
-    victim.write_bytes(b"mine")
+    other_file.write_bytes(b"mine")
     # Such a record has the number of the page at 1 GiB, the file's name, its length and checksum,
     # and the 8 bytes with which a journal begins.
-    name = os.fsencode(victim)
+    name = os.fsencode(other_file)
     checksum = sum(struct.unpack(f"{len(name)}b", name)) % 2**32
     page = struct.pack(">I", 2**30 // 4096 + 1)
     record = page + name + struct.pack(">II", len(name), checksum) + journal_bytes[:8]
@@ -183,11 +185,11 @@ def test_a_journal_rolls_back_but_cannot_remove_other_files(tmp_path):
     for read_only in (True, False):
         with pytest.raises(StoreError, match="journal"):
             ResultStore(tmp_path, read_only=read_only)
-    assert victim.read_bytes() == b"mine"
+    assert other_file.read_bytes() == b"mine"
 
 
 def emptying_journal(path):
-    """Make the journal of a transaction before which the file was empty."""
+    """Make the journal of a transaction before which the store was empty: SQLite would empty it."""
     journal = path.with_name(f"{path.name}-journal")
     head = bytes.fromhex("d9d505f920a163d7") + struct.pack(">5I", 0, 1, 0, 512, 4096)
     journal.write_bytes(head.ljust(512, b"\0"))
@@ -206,7 +208,7 @@ def test_a_refused_store_leaves_no_connection_open(tmp_path, monkeypatch, read_o
     monkeypatch.setattr(sqlite3, "connect", connect)
     with pytest.raises(StoreError, match="move it away"):
         ResultStore(tmp_path, read_only=read_only)
-    assert connections
+    assert len(connections) > 0
     for connection in connections:
         with pytest.raises(sqlite3.ProgrammingError, match="closed"):
             connection.execute("SELECT 1")
@@ -216,7 +218,7 @@ def test_a_refused_store_leaves_no_connection_open(tmp_path, monkeypatch, read_o
 def test_reading_rolls_back_a_journal_but_refuses_a_stray_one(tmp_path, read_only):
     path = make_store(tmp_path)
     expected, before = content_of(tmp_path), path.read_bytes()
-    journal = emptying_journal(path)  # a transaction before which the file was empty
+    journal = emptying_journal(path)
     with pytest.raises(StoreError, match="move it away"):
         ResultStore(tmp_path, read_only=read_only)
     assert path.read_bytes() == before
@@ -241,12 +243,12 @@ def test_a_store_and_its_journals_must_be_regular_files(tmp_path, end, target_ty
     if end:
         make_store(folder)
     path = folder / (STORE_NAME + end)
-    {
-        "link": lambda: path.symlink_to(target),
-        "dangling": lambda: path.symlink_to(tmp_path / "nothing"),
-        "pipe": lambda: os.mkfifo(path),
-        "folder": path.mkdir,
-    }[target_type]()
+    if target_type == "pipe":
+        os.mkfifo(path)
+    elif target_type == "folder":
+        path.mkdir()
+    else:
+        path.symlink_to(target if target_type == "link" else tmp_path / "nothing")
     for read_only in (True, False):
         with pytest.raises(StoreError, match=path.name):
             ResultStore(folder, read_only=read_only)
@@ -257,17 +259,18 @@ def test_a_store_and_its_journals_must_be_regular_files(tmp_path, end, target_ty
 def test_a_stored_measurement_must_be_json(tmp_path):
     with ResultStore(tmp_path) as store:
         store.put("cost", "b", {})
-        values = ("cost", "b", "[" * 100_000)
-        execute_sql(
-            store.path, f"UPDATE measurements SET content = '{values[2]}', crc = {crc_of(values)}"
-        )
+        kind, key, content = "cost", "b", "[" * 100_000
+        crc = zlib.crc32(repr((kind, key, content)).encode())
+        execute_sql(store.path, f"UPDATE measurements SET content = '{content}', crc = {crc}")
         with pytest.raises(StoreError, match=r"results\.sqlite"):
             store.measurements("cost")
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs a system of POSIX")
 @pytest.mark.parametrize("target_type", ["link", "pipe", "device"])
-def test_files_of_a_run_replace_links_pipes_and_devices(tmp_path, target_type):
+def test_files_of_a_run_replace_links_pipes_and_devices_and_keep_their_targets(
+    tmp_path, target_type
+):
     folder, elsewhere = tmp_path / "run", tmp_path / "elsewhere"
     Run.create(folder, RUN)
     Run.open(folder).train()
@@ -287,7 +290,7 @@ def test_files_of_a_run_replace_links_pipes_and_devices(tmp_path, target_type):
             path.symlink_to(target if target_type == "link" else "/dev/null")
     contents = {name: (elsewhere / name).read_bytes() for name in names}
     for name in ("config.json", "checkpoint.safetensors"):
-        if target_type != "link":  # a run is read from files only
+        if target_type != "link":  # a run is read from regular files only
             with pytest.raises((OSError, RunError), match=name):
                 Run.open(folder).train(steps=30)
             (folder / name).unlink()
@@ -303,7 +306,7 @@ def test_files_of_a_run_replace_links_pipes_and_devices(tmp_path, target_type):
 
 
 @pytest.mark.parametrize("name", [".lock", "tensorboard", STORE_NAME])
-def test_links_to_files_written_in_place_are_refused(tmp_path, name):
+def test_links_at_names_that_are_written_in_place_are_refused(tmp_path, name):
     folder, other = tmp_path / "run", tmp_path / "other"
     run = Run.create(folder, RUN)
     other.mkdir()

@@ -1,4 +1,4 @@
-"""Which modules a command imports: those that are named, never those that merely lie there."""
+"""Modules that a command imports from the current folder: only those that a user names."""
 
 import json
 from pathlib import Path
@@ -11,27 +11,28 @@ from processes import python
 from sdnn.agents import SDNNQLearning
 from sdnn.runs import EnvironmentSpec, Run, RunSpec
 
-LOUD = "open({path!r}, 'a').write(__name__ + '\\n')\n"
+NOTE_IMPORT = "open({path!r}, 'a').write(__name__ + '\\n')\n"
 
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """A folder with modules that say so where they are imported, and what others left in it."""
-    names = ("loud", "tensorboardX", "imageio_ffmpeg", "distributed", "jinja2", "yaml", "click")
+    """The current folder, with modules that write their names to a file when they are imported."""
+    names = ("mine", "tensorboardX", "imageio_ffmpeg", "distributed", "jinja2", "yaml", "click")
     for name in names:
-        (tmp_path / f"{name}.py").write_text(LOUD.format(path=str(tmp_path / "imported")))
+        (tmp_path / f"{name}.py").write_text(NOTE_IMPORT.format(path=str(tmp_path / "imported")))
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
-def run(*arguments):
-    """Run a command in the present folder; give the modules that it imported from there."""
-    python(*arguments)
+def modules_imported_by(*arguments):
+    """Run a command of sdnn in the current folder; return the modules imported from there."""
+    python("-m", "sdnn", *arguments)
     imported = Path("imported")
     return imported.read_text().split() if imported.exists() else []
 
 
 def make_run(folder, **changes):
+    """Make a run with changed keys of its configuration file."""
     spec = RunSpec(environment=EnvironmentSpec(id="Pendulum-v1"), budget={"steps": 10})
     Run.create(folder, spec)
     config = json.loads((folder / "config.json").read_text())
@@ -39,12 +40,12 @@ def make_run(folder, **changes):
 
 
 def test_export_does_not_import_modules_named_in_a_configuration(folder):
-    make_run(folder / "run", environment={"id": "loud:Loud-v0"}, agent={"name": "nobody"})
+    make_run(folder / "run", environment={"id": "mine:Mine-v0"}, agent={"name": "nobody"})
     env = gym.make("Pendulum-v1")
     agent = SDNNQLearning(env.observation_space, env.action_space, approximator=agent_files.SMALL)
     agent.save(folder / "run" / "agent.safetensors")
     for source in ("run", "run/agent.safetensors"):
-        assert run("-m", "sdnn", "export", source, "--c-header", "policy.h") == []
+        assert modules_imported_by("export", source, "--c-header", "policy.h") == []
         assert Path("policy.h").exists()
         Path("policy.h").unlink()
 
@@ -52,16 +53,16 @@ def test_export_does_not_import_modules_named_in_a_configuration(folder):
 def test_optional_packages_are_not_imported_from_the_current_folder(folder):
     make_run(folder / "run", output={"tensorboard": True})
     for arguments in (("resume", "run"), ("plot", "run"), ("--version",)):
-        assert run("-m", "sdnn", *arguments) == []
+        assert modules_imported_by(*arguments) == []
 
 
 def test_a_module_named_in_an_environment_id_is_imported_from_the_current_folder(folder):
-    assert run("-m", "sdnn", "train", "loud:Loud-v0", "--dry-run") == ["loud"]
+    assert modules_imported_by("train", "mine:Mine-v0", "--dry-run") == ["mine"]
 
 
 def test_modules_imported_by_a_study_are_found_beside_its_file(folder):
     (folder / "studies").mkdir()
-    (folder / "loud.py").rename(folder / "studies" / "loud.py")
-    study = '[study]\nimports = ["loud"]\n[base]\nenvironment = "Pendulum-v1"\n'
-    (folder / "studies" / "mine.toml").write_text(study)
-    assert run("-m", "sdnn", "sweep", "studies/mine.toml", "--dry-run") == ["loud"]
+    (folder / "mine.py").rename(folder / "studies" / "mine.py")
+    study = '[study]\nimports = ["mine"]\n[base]\nenvironment = "Pendulum-v1"\n'
+    (folder / "studies" / "study.toml").write_text(study)
+    assert modules_imported_by("sweep", "studies/study.toml", "--dry-run") == ["mine"]

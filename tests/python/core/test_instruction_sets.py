@@ -1,4 +1,4 @@
-"""Instruction sets of the processor: equal bits on each, and how one is selected."""
+"""Instruction sets of the processor: equal bits on each, and the selection of one."""
 
 import pytest
 
@@ -8,7 +8,7 @@ from sdnn.support.machine import available_instruction_sets, instruction_set, se
 
 
 @pytest.fixture
-def restore():
+def restored_instruction_set():
     before = instruction_set()
     yield
     set_instruction_set(before)
@@ -29,21 +29,21 @@ def short_trial(n_inputs, noise):
     )
 
 
-@pytest.mark.usefixtures("restore")
+@pytest.mark.usefixtures("restored_instruction_set")
 @pytest.mark.parametrize(("n_inputs", "noise"), [(4, 0.0), (4, 0.02), (6, 0.02)])
 def test_a_trial_has_the_same_bits_on_every_instruction_set(n_inputs, noise):
-    rows = {}
-    for level in available_instruction_sets():
-        set_instruction_set(level)
+    results = {}
+    for name in available_instruction_sets():
+        set_instruction_set(name)
         trial = short_trial(n_inputs, noise)
         trial.advance(N_EPISODES)
-        rows[level] = (trial.n_decisions, trial.test_rows())
-    n_decisions, expected = rows["portable"]
-    assert len(expected["steps"]) == N_EPISODES // EVALUATE_EVERY
-    for level, (count, columns) in rows.items():
-        assert count == n_decisions, level
-        for name, column in columns.items():
-            assert column.tobytes() == expected[name].tobytes(), (level, name)
+        results[name] = (trial.n_decisions, trial.test_rows())
+    expected_decisions, expected_columns = results["portable"]
+    assert len(expected_columns["steps"]) == N_EPISODES // EVALUATE_EVERY
+    for name, (n_decisions, columns) in results.items():
+        assert n_decisions == expected_decisions, name
+        for title, column in columns.items():
+            assert column.tobytes() == expected_columns[title].tobytes(), (name, title)
 
 
 @pytest.mark.parametrize("name", ["", "sse9", "AVX2", "avx2 "])

@@ -23,8 +23,8 @@ def test_public_names_are_importable_listed_and_in_the_stub(name):
         assert getattr(package, public) is not None, public
     stub = ast.parse(Path(package.__file__).with_suffix(".pyi").read_text("utf-8"))
     imports = [node for node in stub.body if isinstance(node, ast.ImportFrom)]
-    for_type_checkers = {name.asname for node in imports for name in node.names}
-    assert set(package.__all__) == set(dir(package)) == for_type_checkers
+    in_stub = {alias.asname for node in imports for alias in node.names}
+    assert set(package.__all__) == set(dir(package)) == in_stub
     with pytest.raises(AttributeError, match="nothing"):
         package.nothing  # noqa: B018
 
@@ -42,7 +42,7 @@ def test_importing_sdnn_imports_no_large_package():
     assert process.stdout == "set()\n"
 
 
-def test_an_installation_of_compiled_modules_only_works(tmp_path):
+def test_an_installation_with_bytecode_but_no_sources_works(tmp_path):
     folder = Path(sdnn.__file__).parent
     shutil.copytree(folder, tmp_path / "sdnn", ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(_core.__file__, tmp_path / "sdnn")

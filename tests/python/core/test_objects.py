@@ -1,4 +1,4 @@
-"""Objects of the core: never made, used by several threads, changed arrays, Ctrl-C."""
+"""Objects of the core: pickling, use by several threads at once, changed arrays, Ctrl-C."""
 
 import pickle
 import re
@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -33,45 +34,41 @@ def test_only_one_binding_header_releases_the_gil():
         assert path.name == "objects.hpp" or not matches, path
 
 
-def in_thread(work):
-    """Run work in another thread, once it has begun."""
-    outcome = []
+@pytest.fixture
+def begin_in_thread():
+    """Begins to call a function in another thread; returns its future result."""
+    with ThreadPoolExecutor() as pool:
 
-    def run():
-        try:
-            outcome.append(work())
-        except BaseException as error:
-            outcome.append(error)
+        def _begin(function):
+            future = pool.submit(function)
+            time.sleep(0.02)
+            return future
 
-    thread = threading.Thread(target=run)
-    thread.start()
-    time.sleep(0.02)
-    return thread, outcome
+        yield _begin
 
 
-def assert_refused(use, thread):
-    """Refused, unless the thread was quicker than its tests."""
+def assert_refused(use, future):
+    """Check that a use is refused while another thread works, unless it has just ended."""
     try:
         use()
     except RuntimeError as error:
         if IN_USE not in str(error):
             raise
     else:
-        thread.join(0.2)
-        assert not thread.is_alive(), "worked on what another thread works on"
+        future.result(0.2)  # raises TimeoutError if the other thread still works
 
 
-def big_trial():
+def long_trial():
     settings = core_cells.GOOD["AcrobotTrial"]()
     settings["protocol"] = core.ProtocolConfig(episodes=100_000)
     return core.AcrobotTrial(**settings)
 
 
-def test_a_trial_refuses_other_threads_while_it_advances():
-    trial = big_trial()
+def test_a_trial_refuses_other_threads_while_it_advances(begin_in_thread):
+    trial = long_trial()
     agent, network = trial.agent, trial.agent.networks[0]
     n_decisions = trial.n_decisions
-    thread, outcome = in_thread(lambda: trial.advance(800))
+    advance = begin_in_thread(lambda: trial.advance(800))
     uses = [
         lambda: trial.advance(1),
         trial.test_rows,
@@ -82,14 +79,13 @@ def test_a_trial_refuses_other_threads_while_it_advances():
     ]
     refuses(IN_USE, uses[0], error=RuntimeError)
     for use in uses:
-        assert_refused(use, thread)
-    thread.join()
-    assert outcome == [None]
+        assert_refused(use, advance)
+    assert advance.result() is None
     assert trial.episode == 800
     assert trial.n_decisions > n_decisions
-    alone = big_trial()
-    alone.advance(800)
-    for name, column in alone.test_rows().items():
+    undisturbed = long_trial()
+    undisturbed.advance(800)
+    for name, column in undisturbed.test_rows().items():
         np.testing.assert_array_equal(trial.test_rows()[name], column)
 
 
@@ -101,11 +97,11 @@ def new_trainer(layer, form="auto", n_samples=20_000):
 
 
 @pytest.mark.parametrize("form", ["plain", "block"])
-def test_a_layer_refuses_other_threads_while_it_is_trained(form):
+def test_a_layer_refuses_other_threads_while_it_is_trained(form, begin_in_thread):
     layer = core.ParallelPerceptron(core_cells.code(), 200, seed=1)
     trainer, other = new_trainer(layer, form), new_trainer(layer, form)
     order = np.tile(np.arange(20_000, dtype=np.int32), 20)
-    thread, outcome = in_thread(lambda: trainer.present(order))
+    training = begin_in_thread(lambda: trainer.present(order))
     uses = [
         lambda: trainer.present(order[:1]),
         lambda: other.present(order[:1]),
@@ -118,37 +114,34 @@ def test_a_layer_refuses_other_threads_while_it_is_trained(form):
     refuses(IN_USE, uses[0], error=RuntimeError)
     order[:] = -(2**31)  # changes nothing: the trainer works on a copy
     for use in uses[1:]:
-        assert_refused(use, thread)
-    thread.join()
-    (count,) = outcome
-    assert count[0] > 0
+        assert_refused(use, training)
+    n_corrections, *_ = training.result()
+    assert n_corrections > 0
 
 
-def test_a_layer_refuses_training_while_threads_read_it():
+def test_a_layer_refuses_training_while_threads_read_it(begin_in_thread):
     layer = core.ParallelPerceptron(core_cells.code(), 4000, seed=1)
     trainer = new_trainer(layer, "plain", n_samples=5)
     bins = np.tile(np.array(core_cells.BINS, np.int32), (500_000, 1))
     expected = layer.counts(core_cells.BINS)
-    reads = [in_thread(lambda: layer.counts(bins)) for _ in range(2)]
+    readings = [begin_in_thread(lambda: layer.counts(bins)) for _ in range(2)]
     refuses(IN_USE, trainer.present, [0], error=RuntimeError)
     bins[:] = 2**31 - 1  # changes nothing: the threads read a copy
     np.testing.assert_array_equal(layer.counts(core_cells.BINS), expected)
     assert layer.weights.shape == (4000, 40)
-    for thread, outcome in reads:
-        thread.join()
-        np.testing.assert_array_equal(outcome[0][-3:], expected)
+    for reading in readings:
+        np.testing.assert_array_equal(reading.result()[-3:], expected)
     trainer.present([0])
 
 
-def test_a_batch_of_acrobots_refuses_other_threads_while_it_steps():
+def test_a_batch_of_acrobots_refuses_other_threads_while_it_steps(begin_in_thread):
     n = 2**16
     batch = core.AcrobotBatch(core.AcrobotConfig(), n)
-    moving = np.ones(n, np.bool_)
-    thread, outcome = in_thread(lambda: batch.step(np.ones(n), np.ones(n), moving))
-    refuses(IN_USE, batch.reset, moving, error=RuntimeError)
-    assert_refused(batch.states, thread)
-    thread.join()
-    assert len(outcome[0]) == 3
+    all_of_them = np.ones(n, np.bool_)
+    step = begin_in_thread(lambda: batch.step(np.ones(n), np.ones(n), all_of_them))
+    refuses(IN_USE, batch.reset, all_of_them, error=RuntimeError)
+    assert_refused(batch.states, step)
+    assert len(step.result()) == 3, "rewards, terminated and truncated"
 
 
 LONG_WORK = {
@@ -157,9 +150,10 @@ LONG_WORK = {
     "correlations": "c.correlation_matrix_patterns(2**20, np.eye(64), 1)",
     "a step of many": "b = c.AcrobotBatch(c.AcrobotConfig(), 2**22); n = 2**22;"
     " b.step(np.zeros(n), np.ones(n), np.ones(n, bool))",
-    "a trial of small steps": "core_cells.small_steps().advance(2)",
+    "a trial of small steps": "trial_of_small_steps().advance(2)",
     "products": "b = np.zeros((30_000, 2), np.int32); core_cells.code().gram(b)",
 }
+"""Statements that run for longer than the test waits."""
 
 
 @pytest.mark.parametrize("work", LONG_WORK)
@@ -168,11 +162,10 @@ def test_ctrl_c_ends_long_work_of_the_core_within_3_seconds(work):
 import sys, time
 sys.path.insert(0, {str(Path(core_cells.__file__).parent)!r})
 import numpy as np, sdnn._core as c, core_cells
-def small_steps():
+def trial_of_small_steps():
     settings = core_cells.GOOD["AcrobotTrial"]()
     settings["acrobot"] = c.AcrobotConfig(integration_step=1e-6)
     return c.AcrobotTrial(**settings)
-core_cells.small_steps = small_steps
 print("ready", flush=True)
 try:
     {LONG_WORK[work]}
@@ -194,17 +187,17 @@ else:
 
 
 def test_a_trial_continues_after_ctrl_c_between_episodes():
-    trial = big_trial()
+    trial = long_trial()
     timer = threading.Timer(0.3, signal.raise_signal, [signal.SIGINT])
     timer.start()
     with pytest.raises(KeyboardInterrupt):
         trial.advance(100_000)
     timer.join()
-    done = trial.episode
+    n_episodes = trial.episode
     trial.advance(50)
-    alone = big_trial()
-    alone.advance(done + 50)
-    np.testing.assert_array_equal(trial.test_rows()["steps"], alone.test_rows()["steps"])
+    uninterrupted = long_trial()
+    uninterrupted.advance(n_episodes + 50)
+    np.testing.assert_array_equal(trial.test_rows()["steps"], uninterrupted.test_rows()["steps"])
 
 
 def test_a_process_exits_cleanly_while_a_thread_works_in_the_core():

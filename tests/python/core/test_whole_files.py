@@ -4,8 +4,8 @@ import gzip
 import os
 import subprocess
 import sys
-import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -32,7 +32,7 @@ def partial_files(folder: Path) -> list[Path]:
     return sorted(folder.glob(f"*{PARTIAL_SUFFIX}"))
 
 
-def test_write_whole_replaces_a_file_and_leaves_no_other(tmp_path):
+def test_write_whole_replaces_a_file_and_leaves_no_partial_one(tmp_path):
     path = tmp_path / "report.html"
     write_whole(path, b"one")
     write_whole(path, b"two")
@@ -49,50 +49,50 @@ def test_a_failed_write_keeps_the_existing_path(tmp_path):
 
 def test_only_partial_files_of_dead_processes_are_removed(tmp_path):
     write_whole(tmp_path / "rows.csv", b"old")
-    foreign = tmp_path / f"notes{PARTIAL_SUFFIX}"  # whose name we never gave
-    foreign.write_bytes(b"mine")
+    other_file = tmp_path / f"notes{PARTIAL_SUFFIX}"  # a name that the package never gives
+    other_file.write_bytes(b"mine")
     command = [sys.executable, "-c", WRITE_SLOWLY, str(tmp_path / "rows.csv")]
     with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
         try:
             assert process.stdout.readline() == b"half\n"
-            partial = partial_files(tmp_path)
-            assert len(partial) == 2
+            before = partial_files(tmp_path)
+            assert len(before) == 2
             remove_abandoned_files(tmp_path)
-            assert partial_files(tmp_path) == partial
+            assert partial_files(tmp_path) == before
         finally:
             process.kill()
     remove_abandoned_files(tmp_path)
-    assert partial_files(tmp_path) == [foreign]
+    assert partial_files(tmp_path) == [other_file]
     assert (tmp_path / "rows.csv").read_bytes() == b"old"
 
 
-@pytest.mark.parametrize(("seconds", "stays"), [(0, True), (3600, False)])
+@pytest.mark.parametrize(("age_in_seconds", "is_kept"), [(0, True), (3600, False)])
 def test_without_file_locks_partial_files_are_removed_after_an_hour(
-    tmp_path, monkeypatch, seconds, stays
+    tmp_path, monkeypatch, age_in_seconds, is_kept
 ):
     monkeypatch.setattr(files, "lock", lambda descriptor: None)
     abandoned = tmp_path / f"rows.csv.0123456789abcdef{PARTIAL_SUFFIX}"
-    foreign_files = [tmp_path / "mine.txt", tmp_path / f"mine{PARTIAL_SUFFIX}"]
-    for path in (abandoned, *foreign_files):
+    other_files = {tmp_path / "mine.txt", tmp_path / f"mine{PARTIAL_SUFFIX}"}
+    for path in (abandoned, *other_files):
         path.write_bytes(b"half")
-        os.utime(path, (time.time() - seconds,) * 2)
+        os.utime(path, (time.time() - age_in_seconds,) * 2)
     remove_abandoned_files(tmp_path)
-    assert set(tmp_path.iterdir()) == {*foreign_files, *([abandoned] if stays else [])}
+    assert set(tmp_path.iterdir()) == other_files | ({abandoned} if is_kept else set())
     write_whole(tmp_path / "rows.csv", b"whole")
     assert (tmp_path / "rows.csv").read_bytes() == b"whole"
 
 
-def test_a_partial_file_removed_before_its_lock_is_created_again(tmp_path, monkeypatch):
+def test_a_partial_file_that_is_removed_before_it_is_locked_is_created_again(tmp_path, monkeypatch):
     locks = []
 
-    def removed_first(descriptor: int) -> bool:
+    def remove_the_first_file_and_lock(descriptor: int) -> bool:
         if not locks:
             for path in partial_files(tmp_path):
                 path.unlink()
         locks.append(descriptor)
         return True
 
-    monkeypatch.setattr(files, "lock", removed_first)
+    monkeypatch.setattr(files, "lock", remove_the_first_file_and_lock)
     write_whole(tmp_path / "rows.csv", b"whole")
     assert len(locks) == 2
     assert [path.name for path in tmp_path.iterdir()] == ["rows.csv"]
@@ -102,12 +102,12 @@ def test_a_partial_file_removed_before_its_lock_is_created_again(tmp_path, monke
 def test_write_whole_replaces_links_and_pipes(tmp_path):
     target = tmp_path / "target"
     target.write_bytes(b"old")
-    names = [tmp_path / name for name in ("link", "dangling", "pipe", "device")]
-    names[0].symlink_to(target)
-    names[1].symlink_to(tmp_path / "nothing")
-    os.mkfifo(names[2])  # without a reader, for which writing would wait
-    names[3].symlink_to("/dev/null")
-    for path in names:
+    link, dangling, pipe, device = (tmp_path / str(number) for number in range(4))
+    link.symlink_to(target)
+    dangling.symlink_to(tmp_path / "nothing")
+    os.mkfifo(pipe)  # without a reader, for which writing would wait
+    device.symlink_to("/dev/null")
+    for path in (link, dangling, pipe, device):
         write_whole(path, b"new")
         assert not path.is_symlink()
         assert path.read_bytes() == b"new"
@@ -116,33 +116,29 @@ def test_write_whole_replaces_links_and_pipes(tmp_path):
 
 
 def test_write_whole_writes_to_devices():
-    ends = os.pipe()
-    if Path(f"/dev/fd/{ends[1]}").exists():  # as /dev/stdout
-        write_whole(Path(f"/dev/fd/{ends[1]}"), b"through")
-        assert os.read(ends[0], 100) == b"through"
-    for end in ends:
-        os.close(end)
+    read_end, write_end = os.pipe()
+    device = Path(f"/dev/fd/{write_end}")  # like /dev/stdout
+    if device.exists():
+        write_whole(device, b"through")
+        assert os.read(read_end, 100) == b"through"
+    os.close(read_end)
+    os.close(write_end)
 
 
 def test_concurrent_writers_leave_the_whole_file_of_one_of_them(tmp_path):
     path = tmp_path / "report.html"
-    contents = [bytes([letter]) * 300_000 for letter in b"ab"]
+    contents = [b"a" * 300_000, b"b" * 300_000]
     write_whole(path, contents[0])
-    errors = []
 
     def write(content):
-        try:
-            for _ in range(30):
-                write_whole(path, [content[:1000], content[1000:]])
-        except OSError as error:
-            errors.append(error)
+        for _ in range(30):
+            write_whole(path, [content[:1000], content[1000:]])
 
-    writers = [threading.Thread(target=write, args=(content,)) for content in contents]
-    for writer in writers:
-        writer.start()
-    while any(writer.is_alive() for writer in writers):
-        assert path.read_bytes() in contents
-    assert errors == []
+    with ThreadPoolExecutor() as pool:
+        writers = [pool.submit(write, content) for content in contents]
+        while not all(writer.done() for writer in writers):
+            assert path.read_bytes() in contents
+    assert [writer.result() for writer in writers] == [None, None], "without an error"
     assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
 
 
@@ -150,7 +146,7 @@ def test_csv_quotes_cells_with_commas():
     assert csv_bytes(("a", "b"), [(1, "x, y"), (2.5, "µ")]) == 'a,b\n1,"x, y"\n2.5,µ\n'.encode()
 
 
-def test_large_csv_tables_are_written_in_pieces_also_compressed(tmp_path):
+def test_large_csv_tables_are_written_in_pieces_plain_or_compressed(tmp_path):
     rows = [(number, "x" * 100) for number in range(30_000)]
     pieces = list(csv_pieces(("a", "b"), rows))
     assert len(pieces) > 2

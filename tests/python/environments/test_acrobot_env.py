@@ -21,22 +21,18 @@ ID = "sdnn/AcrobotSwingUp-v0"
 
 
 class FakeClock:
-    """A clock that does not wait, and records the rates."""
+    """A clock of pygame that does not wait, and records the frame rates."""
 
-    ticks: ClassVar[list[float]] = []
+    frame_rates: ClassVar[list[float]] = []
 
-    def tick(self, rate):
-        self.ticks.append(rate)
+    def tick(self, frame_rate):
+        self.frame_rates.append(frame_rate)
 
 
 @pytest.fixture(autouse=True)
 def no_screen(monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     monkeypatch.setattr(pygame.time, "Clock", FakeClock)
-
-
-def shares(n, seed=0):
-    return np.random.default_rng(seed).uniform(-1.0, 1.0, n)
 
 
 @pytest.mark.parametrize("render_mode", [None, "rgb_array", "rgb_array_list", "human"])
@@ -91,20 +87,22 @@ def test_steps_and_resets_of_the_environment_have_the_bits_of_the_core():
         core.reset()
         np.testing.assert_array_equal(observation, sensors.observe(core.state()))
         assert info["goal_tolerance"] == tolerance
-        for share in shares(50, episode):
+        # Actions are shares of the largest torque.
+        for share in np.random.default_rng(episode).uniform(-1.0, 1.0, 50):
             observation, *result, info = env.step(np.array([share]))
             assert tuple(result) == core.step(AcrobotConfig().max_torque * share, tolerance)
             np.testing.assert_array_equal(info["state"], core.state())
             np.testing.assert_array_equal(observation, sensors.observe(core.state()))
             assert info["tip_height"] == core.tip_height()
-            assert info["is_success"] == result[1]
-            if result[1] or result[2]:
+            _, terminated, truncated = result
+            assert info["is_success"] == terminated
+            if terminated or truncated:
                 n_finished += 1
                 break
     assert n_finished == n_episodes
 
 
-def test_an_episode_is_truncated_after_50_decisions_and_needs_a_reset():
+def test_an_episode_is_truncated_after_50_decisions_and_then_needs_a_reset():
     env = gym.make(ID)
     env.reset()
     flags = [env.step(np.zeros(1, np.float32))[2:4] for _ in range(50)]
@@ -136,7 +134,7 @@ def test_a_goal_tolerance_holds_from_the_next_reset_on():
     assert tolerances_around_reset(env) == (0.1, 0.1)
 
 
-def test_the_goal_tolerance_is_a_share_of_the_speed_limits():
+def test_the_goal_tolerance_is_a_share_of_the_speed_limits_of_both_joints():
     # The tip passes the goal at 0.615 and 1.097 rad/s: at 0.0653 of 3 pi and 0.0699 of 5 pi rad/s.
     terminated = []
     for tolerance in (0.0, 0.0695, 0.0703, np.inf):
@@ -152,76 +150,74 @@ def test_bad_actions_and_reset_options_are_refused_by_name():
     with pytest.raises(gym.error.ResetNeeded):
         env.step([0.0])
     env.reset()
-    for bad in (np.nan, np.inf, -np.inf, 1.01, -1.01):
-        refuses("action", env.step, [bad])
+    for action in (np.nan, np.inf, -np.inf, 1.01, -1.01):
+        refuses("action", env.step, [action])
     refuses("action", env.step, [0.0, 0.0])
-    for bad in (-0.1, np.nan):
-        refuses("goal_tolerance", env.reset, options={"goal_tolerance": bad})
-        refuses("goal_tolerance", setattr, env, "goal_tolerance", bad)
+    for tolerance in (-0.1, np.nan):
+        refuses("goal_tolerance", env.reset, options={"goal_tolerance": tolerance})
+        refuses("goal_tolerance", setattr, env, "goal_tolerance", tolerance)
     refuses("goal_tolerance", env.reset, options={"goal_tolerance": "low"})
     refuses("'episode'", env.reset, options={"episode": 3})
     assert env.goal_tolerance == 1.0
 
 
-def test_frames_change_with_the_state_and_show_the_torque():
+def test_frames_change_only_with_the_state_and_show_the_torque():
     env = AcrobotSwingUpEnv(render_mode="rgb_array")
     env.reset()
     hanging = env.render()
     assert hanging.shape == (500, 500, 3)
     assert hanging.dtype == np.uint8
-    assert len(np.unique(hanging.reshape(-1, 3), axis=0)) > 20
+    assert len(np.unique(hanging.reshape(-1, 3), axis=0)) > 20, "colours"
     np.testing.assert_array_equal(env.render(), hanging)
     env.step([1.0])
     moved = env.render()
     assert (moved != hanging).any(axis=2).mean() > 0.01
 
-    def is_orange(picture):  # the torque's arrow
-        red, green, blue = np.moveaxis(picture.astype(int), 2, 0)
-        return (red > 200) & (green > 90) & (green < 160) & (blue < 90)
+    def n_orange_pixels(frame):  # of the torque's arrow
+        red, green, blue = np.moveaxis(frame.astype(int), 2, 0)
+        return ((red > 200) & (green > 90) & (green < 160) & (blue < 90)).sum()
 
-    assert is_orange(hanging).sum() == 0
-    assert is_orange(moved).sum() > 300
+    assert n_orange_pixels(hanging) == 0
+    assert n_orange_pixels(moved) > 300
     env.close()
-    env.close()
+    env.close()  # a second time, without an error
 
 
 def test_human_mode_draws_25_frames_per_second_and_render_returns_none(monkeypatch):
-    monkeypatch.setattr(FakeClock, "ticks", [])
+    monkeypatch.setattr(FakeClock, "frame_rates", [])
     env = AcrobotSwingUpEnv(render_mode="human")
     env.reset()
     env.step([1.0])
-    frames_per_second = 25
-    assert FakeClock.ticks == (1 + 25) * [frames_per_second]  # the reset's, and 25 of the decision
+    assert FakeClock.frame_rates == (1 + 25) * [25]  # a frame of the reset, 25 of the decision
     assert env.render() is None
     env.close()
 
 
 def test_rgb_array_list_has_25_frames_per_decision():
-    whole, parts = AcrobotSwingUpEnv(render_mode="rgb_array"), []
-    env = AcrobotSwingUpEnv(render_mode="rgb_array_list")
+    env, frames = AcrobotSwingUpEnv(render_mode="rgb_array_list"), []
+    of_decisions = AcrobotSwingUpEnv(render_mode="rgb_array")  # renders only after decisions
     assert env.metadata["render_fps"] == 25
-    assert whole.metadata["render_fps"] == 4
-    for environment in (whole, env):
-        environment.reset()
-    for torque in (1.0, -1.0):
-        parts += env.render()
-        np.testing.assert_array_equal(parts[-1], whole.render())
-        assert env.render() == []
-        for environment in (whole, env):
-            environment.step([torque])
-    parts += env.render()
-    assert len(parts) == 1 + 2 * 25  # the reset's, and 25 of each decision
-    steps = [(a != b).any(axis=2).mean() for a, b in itertools.pairwise(parts)]
-    assert min(steps) > 0.0  # every picture differs from the one before
-    env.step([0.0])
+    assert of_decisions.metadata["render_fps"] == 4
     env.reset()
+    of_decisions.reset()
+    for torque in (1.0, -1.0):
+        frames += env.render()
+        np.testing.assert_array_equal(frames[-1], of_decisions.render())
+        assert env.render() == [], "all frames have been returned"
+        env.step([torque])
+        of_decisions.step([torque])
+    frames += env.render()
+    assert len(frames) == 1 + 2 * 25  # a frame of the reset, and 25 of each decision
+    assert all((frame != later).any() for frame, later in itertools.pairwise(frames))
+    env.step([0.0])
+    env.reset()  # drops the frames before it
     (hanging,) = env.render()
-    np.testing.assert_array_equal(hanging, parts[0])
+    np.testing.assert_array_equal(hanging, frames[0])
     env.close()
-    whole.close()
+    of_decisions.close()
 
 
-def test_rgb_array_list_ends_at_the_goal():
+def test_rgb_array_list_ends_at_the_goal_with_a_greener_frame():
     env = AcrobotSwingUpEnv(render_mode="rgb_array_list", goal_tolerance=1e6)
     rng = np.random.default_rng(0)
     env.reset()
@@ -231,30 +227,32 @@ def test_rgb_array_list_ends_at_the_goal():
         _, _, terminated, truncated, info = env.step([rng.uniform(-1.0, 1.0)])
         if truncated:
             env.reset()
-    pictures = env.render()
+    frames = env.render()
     assert info["is_success"]
-    assert 1 <= len(pictures) <= 25
+    assert 1 <= len(frames) <= 25
 
-    def is_green(picture):  # the tip, the line and the words
-        red, green, blue = np.moveaxis(picture.astype(int), 2, 0)
+    def n_green_pixels(frame):  # of the tip, the line and the words
+        red, green, blue = np.moveaxis(frame.astype(int), 2, 0)
         return ((green > red + 40) & (green > blue + 20)).sum()
 
-    assert is_green(pictures[-1]) > 1.2 * is_green(pictures[0])
+    assert n_green_pixels(frames[-1]) > 1.2 * n_green_pixels(frames[0])
     env.close()
 
 
 @pytest.mark.parametrize(
-    ("interval", "step", "n_pictures", "rate"),
+    ("decision_interval", "integration_step", "n_frames", "frames_per_second"),
     [(1.0, 0.02, 25, 25), (0.5, 0.02, 25, 50), (0.5, 0.05, 10, 20), (0.02, 0.02, 1, 50)],
 )
-def test_frames_divide_the_decision_interval_evenly(interval, step, n_pictures, rate):
-    config = AcrobotConfig(decision_interval=interval, integration_step=step)
+def test_frames_divide_the_decision_interval_evenly(
+    decision_interval, integration_step, n_frames, frames_per_second
+):
+    config = AcrobotConfig(decision_interval=decision_interval, integration_step=integration_step)
     env = AcrobotSwingUpEnv(config=config, render_mode="rgb_array_list")
     env.reset()
     env.render()
     env.step([1.0])
-    assert len(env.render()) == n_pictures
-    assert env.metadata["render_fps"] == rate
+    assert len(env.render()) == n_frames
+    assert env.metadata["render_fps"] == frames_per_second
     env.close()
 
 
@@ -263,18 +261,18 @@ def test_states_between_decisions_are_those_of_shorter_decisions():
     acrobot = _core.Acrobot(config)
     acrobot.step(3.0, 0.0)
     before = acrobot.state()
-    states = list(AcrobotMotion(config).between(before, -7.0, 0.0))
     acrobot.step(-7.0, 0.0)
-    short = _core.Acrobot(AcrobotConfig(decision_interval=0.04, max_decisions=99))
-    short.set_state(before)
-    for state in states:
-        short.step(-7.0, 0.0)
-        np.testing.assert_array_equal(state, short.state())
-    short.step(-7.0, 0.0)
-    np.testing.assert_allclose(short.state(), acrobot.state(), rtol=1e-9)
+    # A decision of 1 s has 25 frames, 0.04 s apart, the last of which is at its end.
+    expected = _core.Acrobot(AcrobotConfig(decision_interval=0.04, max_decisions=99))
+    expected.set_state(before)
+    for state in AcrobotMotion(config).between(before, -7.0, 0.0):
+        expected.step(-7.0, 0.0)
+        np.testing.assert_array_equal(state, expected.state())
+    expected.step(-7.0, 0.0)
+    np.testing.assert_allclose(expected.state(), acrobot.state(), rtol=1e-9)
 
 
-def test_render_without_a_mode_warns():
+def test_render_without_a_mode_warns_and_returns_none():
     env = AcrobotSwingUpEnv()
     env.reset()
     with pytest.warns(UserWarning, match="render_mode"):

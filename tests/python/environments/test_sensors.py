@@ -9,22 +9,22 @@ from sdnn import _core
 from sdnn.environments import AcrobotSwingUpEnv, NoisySensors, RedundantSensors, SensorConfig
 
 
-def run(env, n_episodes=20):
-    """Observations and true states of random episodes."""
+def random_episodes(env):
+    """Return the observations of 20 episodes with random actions, and the acrobot's states."""
     rng = np.random.default_rng(1)
-    observed, states = [], []
-    for _ in range(n_episodes):
+    observations, states = [], []
+    for _ in range(20):
         observation, info = env.reset()
-        ended = False
-        while True:
-            observed.append(observation)
-            states.append(info["state"])
-            if ended:
-                break
+        observations.append(observation)
+        states.append(info["state"])
+        has_ended = False
+        while not has_ended:
             action = rng.uniform(-1.0, 1.0, 1)
             observation, _, terminated, truncated, info = env.step(action)
-            ended = terminated or truncated
-    return observed, states
+            observations.append(observation)
+            states.append(info["state"])
+            has_ended = terminated or truncated
+    return observations, states
 
 
 @pytest.mark.parametrize("n_sensors", [4, 5, 6])
@@ -36,9 +36,9 @@ def test_sensor_wrappers_have_the_bits_of_the_core(n_sensors, noise, stream):
     env = NoisySensors(env, sigma=noise, seed=42, stream=stream)
     config = SensorConfig(n_sensors=n_sensors, noise=noise)
     core = _core.AcrobotSensors(config, 42, _core.Stream.__members__[stream])
-    observed, states = run(env)
-    assert len(observed) > 50
-    for observation, state in zip(observed, states, strict=True):
+    observations, states = random_episodes(env)
+    assert len(observations) > 50
+    for observation, state in zip(observations, states, strict=True):
         assert observation.dtype == np.float64
         np.testing.assert_array_equal(observation, core.observe(state))
 
@@ -46,7 +46,7 @@ def test_sensor_wrappers_have_the_bits_of_the_core(n_sensors, noise, stream):
 def test_noisy_observations_are_within_their_space():
     env = NoisySensors(RedundantSensors(AcrobotSwingUpEnv()), sigma=0.3)
     assert env.observation_space == gym.spaces.Box(0.0, 1.0, (6,), np.float32)
-    for observation in run(env)[0]:
+    for observation in random_episodes(env)[0]:
         assert env.observation_space.contains(observation)
 
 
@@ -58,13 +58,13 @@ def test_redundant_sensors_may_be_custom_functions_with_bounds():
     )
     np.testing.assert_array_equal(env.observation_space.low, [0, 0, 0, 0, -1, 0, 4])
     np.testing.assert_array_equal(env.observation_space.high, [1, 1, 1, 1, 1, 1, 4])
-    for observation in run(env)[0]:
+    for observation in random_episodes(env)[0]:
         assert observation[4] == observation[0] - observation[1]
         assert observation[6] == 4.0
 
 
-class Switches(gym.Env):
-    """Observes whole numbers."""
+class Integers(gym.Env):
+    """Observations are integers."""
 
     observation_space = gym.spaces.Box(0, 1, (3,), np.int8)
     action_space = gym.spaces.Discrete(2)
@@ -74,31 +74,33 @@ class Switches(gym.Env):
 
 
 def test_sensors_convert_integer_observations_to_float():
-    noisy = NoisySensors(Switches(), 0.02, edge="saturate")
-    observed, _ = noisy.reset(seed=1)
-    assert noisy.observation_space.contains(observed)
-    assert observed[0] < 0.1
-    assert (observed[1:] > 0.9).all()
-    assert ((observed > 0.0) & (observed < 1.0)).any()
-    more = RedundantSensors(Switches(), [lambda s: s.mean() / 2], bounds=[(0.0, 0.5)])
-    observed, _ = more.reset()
-    assert more.observation_space.contains(observed)
-    assert more.observation_space.high[3] == 0.5
-    assert observed.tolist() == [0.0, 1.0, 1.0, np.float32(1 / 3)]
+    env = NoisySensors(Integers(), 0.02, edge="saturate")
+    observation, _ = env.reset(seed=1)
+    assert env.observation_space.contains(observation)
+    assert observation[0] < 0.1
+    assert (observation[1:] > 0.9).all()
+    assert ((observation > 0.0) & (observation < 1.0)).any()
+    env = RedundantSensors(Integers(), [lambda x: x.mean() / 2], bounds=[(0.0, 0.5)])
+    observation, _ = env.reset()
+    assert env.observation_space.contains(observation)
+    assert env.observation_space.high[3] == 0.5
+    assert observation.tolist() == [0.0, 1.0, 1.0, np.float32(1 / 3)]  # half the mean of 0, 1, 1
 
 
-def test_edge_wraps_or_clips_noise_per_variable():
+def test_edge_wraps_or_clips_noise_beyond_1_for_each_variable():
     env = gym.wrappers.TransformObservation(
         AcrobotSwingUpEnv(), np.ones_like, gym.spaces.Box(0.0, 1.0, (4,), np.float32)
     )
-    edges = ("saturate", "wrap", "saturate", "saturate")
-    noisy = NoisySensors(env, sigma=0.1, edge=edges, seed=3)
-    observed = np.array([noisy.reset()[0] for _ in range(100)])
-    assert (observed[:, 1] < 0.5).any()
-    assert (observed[:, 0] > 0.5).all()
-    assert (observed[:, 0] == 1.0).any()
-    noisy = NoisySensors(env, sigma=0.1, edge="saturate", seed=3)
-    assert (np.array([noisy.reset()[0] for _ in range(100)]) > 0.5).all()
+
+    def noisy_ones(edge):
+        noisy = NoisySensors(env, sigma=0.1, edge=edge, seed=3)
+        return np.array([noisy.reset()[0] for _ in range(100)])
+
+    observations = noisy_ones(("saturate", "wrap", "saturate", "saturate"))
+    assert (observations[:, 1] < 0.5).any(), "numbers above 1 continue at 0"
+    assert (observations[:, 0] > 0.5).all()
+    assert (observations[:, 0] == 1.0).any()
+    assert (noisy_ones("saturate") > 0.5).all()
 
 
 def test_reset_with_a_seed_restarts_the_noise():
@@ -111,15 +113,15 @@ def test_reset_with_a_seed_restarts_the_noise():
 
 
 def test_noise_does_not_change_the_states_of_the_task():
-    quiet, loud = AcrobotSwingUpEnv(), NoisySensors(AcrobotSwingUpEnv(), sigma=0.5)
-    for clean, noisy in zip(run(quiet)[1], run(loud)[1], strict=True):
-        np.testing.assert_array_equal(clean, noisy)
+    _, states = random_episodes(AcrobotSwingUpEnv())
+    _, states_with_noise = random_episodes(NoisySensors(AcrobotSwingUpEnv(), sigma=0.5))
+    np.testing.assert_array_equal(states, states_with_noise)
 
 
 def test_sensor_wrappers_are_recreated_from_the_spec():
     env = NoisySensors(RedundantSensors(gym.make("sdnn/AcrobotSwingUp-v0")), sigma=0.01, seed=5)
-    again = gym.make(env.spec)
-    np.testing.assert_array_equal(env.reset()[0], again.reset()[0])
+    recreated = gym.make(env.spec)
+    np.testing.assert_array_equal(env.reset()[0], recreated.reset()[0])
 
 
 def test_bad_arguments_of_sensor_wrappers_are_refused_by_name():

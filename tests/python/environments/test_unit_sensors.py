@@ -32,7 +32,7 @@ def test_observations_are_scaled_to_the_unit_interval_and_clipped():
     assert env.observation_space == gym.spaces.Box(0.0, 1.0, (3,), np.float64)
 
 
-def test_observation_low_overrides_the_bounds_of_the_space():
+def test_observation_low_overrides_the_lower_bounds_of_the_space():
     env = ConstantObservation([-np.inf, 0], [4, 8], [1, 2])
     # 1 in -4 to 4 is 5/8 of the range, 2 in 0 to 8 a quarter.
     assert UnitSensors(env, observation_low=[-4, 0]).reset()[0].tolist() == [5 / 8, 2 / 8]
@@ -47,14 +47,13 @@ def test_unbounded_observations_need_a_range(large):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"observation_low": [0]}, "observation_low"),
-        ({"observation_high": [0, 8]}, "observation_low"),
-    ],
+    "bounds",
+    [{"observation_low": [0]}, {"observation_high": [0, 8]}],
+    ids=["one of two bounds", "0 not above 0"],
 )
-def test_ranges_of_wrong_length_or_order_are_refused(arguments, message):
-    refuses(message, UnitSensors, ConstantObservation([0, 0], [1, 8], [1, 2]), **arguments)
+def test_ranges_of_wrong_length_or_order_are_refused(bounds):
+    env = ConstantObservation([0, 0], [1, 8], [1, 2])
+    refuses("observation_low", UnitSensors, env, **bounds)
 
 
 def test_discrete_observations_are_refused():

@@ -1,5 +1,7 @@
 """Batched acrobots: the bits of single environments."""
 
+import copy
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -10,11 +12,11 @@ from sdnn import _core
 from sdnn.environments import AcrobotConfig, AcrobotSwingUpVectorEnv, GoalSchedule
 
 ID = "sdnn/AcrobotSwingUp-v0"
-EASY = AcrobotConfig(goal_height=0.5, max_decisions=12)
-LEVELS = _core.available_instruction_sets()
+LOW_GOAL = AcrobotConfig(goal_height=0.5, max_decisions=12)
+INSTRUCTION_SETS = _core.available_instruction_sets()
 
 
-@pytest.fixture(params=LEVELS)
+@pytest.fixture(params=INSTRUCTION_SETS)
 def instruction_set(request):
     before = _core.instruction_set()
     _core.set_instruction_set(request.param)
@@ -22,17 +24,17 @@ def instruction_set(request):
     _core.set_instruction_set(before)
 
 
-def assert_same(got, expected):
-    """Nested tuples and dicts of arrays: equal types, shapes and bits."""
+def assert_equal_bits(got, expected):
+    """Check that nested tuples and dicts of arrays have equal types, shapes and bits."""
     assert type(got) is type(expected)
     if isinstance(expected, dict):
         assert got.keys() == expected.keys()
         for key, value in expected.items():
-            assert_same(got[key], value)
+            assert_equal_bits(got[key], value)
     elif isinstance(expected, tuple):
         assert len(got) == len(expected)
         for item, expected_item in zip(got, expected, strict=True):
-            assert_same(item, expected_item)
+            assert_equal_bits(item, expected_item)
     else:
         assert got.dtype == expected.dtype
         assert got.shape == expected.shape
@@ -40,6 +42,7 @@ def assert_same(got, expected):
 
 
 def batched_and_sync(num_envs, **kwargs):
+    """Return a batched environment, and a `SyncVectorEnv` of single ones."""
     return [
         gym.make_vec(ID, num_envs=num_envs, vectorization_mode=mode, **kwargs)
         for mode in ("vector_entry_point", "sync")
@@ -61,14 +64,14 @@ def test_make_vec_returns_the_batched_environment_with_the_spaces_of_a_sync_vect
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
 @pytest.mark.parametrize("num_envs", [1, 3, 8, 13])
 def test_a_batch_has_the_bits_of_single_environments(instruction_set, num_envs, dtype):
-    envs, sync = batched_and_sync(num_envs, config=EASY, dtype=dtype)
+    envs, sync = batched_and_sync(num_envs, config=LOW_GOAL, dtype=dtype)
     random = np.random.default_rng(num_envs)
-    assert_same(envs.reset(seed=3), sync.reset(seed=3))
+    assert_equal_bits(envs.reset(seed=3), sync.reset(seed=3))
     n_terminated = n_truncated = 0
     for _ in range(150):
         actions = random.uniform(-1.0, 1.0, (num_envs, 1)).astype(dtype)
         got, expected = envs.step(actions), sync.step(actions)
-        assert_same(got, expected)
+        assert_equal_bits(got, expected)
         n_terminated += got[2].sum()
         n_truncated += got[3].sum()
     assert n_terminated >= num_envs
@@ -76,7 +79,7 @@ def test_a_batch_has_the_bits_of_single_environments(instruction_set, num_envs, 
 
 
 def test_resets_of_a_batch_equal_those_of_a_sync_vector():
-    envs, sync = batched_and_sync(4, config=EASY)
+    envs, sync = batched_and_sync(4, config=LOW_GOAL)
     random = np.random.default_rng(2)
     mask = np.array([True, False, True, False])
     resets = [
@@ -91,23 +94,22 @@ def test_resets_of_a_batch_equal_those_of_a_sync_vector():
     ]
     for _ in range(3):
         for arguments in resets:
-            theirs = {
-                key: dict(value) if key == "options" else value for key, value in arguments.items()
-            }
-            assert_same(envs.reset(**arguments), sync.reset(**theirs))
+            # `SyncVectorEnv` removes the mask from its options.
+            expected = sync.reset(**copy.deepcopy(arguments))
+            assert_equal_bits(envs.reset(**arguments), expected)
             assert envs.goal_tolerance.tolist() == list(sync.get_attr("goal_tolerance"))
             for _ in range(random.integers(15)):
                 actions = random.uniform(-1.0, 1.0, (4, 1)).astype(np.float32)
-                assert_same(envs.step(actions), sync.step(actions))
-    assert "reset_mask" in resets[4]["options"]  # what was given stays as it was
+                assert_equal_bits(envs.step(actions), sync.step(actions))
+    assert "reset_mask" in resets[4]["options"], "a batch does not change its options"
 
 
-def end_episodes(envs):
-    """Let all end at once, as `max_decisions` = 2 does, and the next step begin the next ones."""
-    still = np.zeros((envs.num_envs, 1))
-    assert envs.step(still)[3].tolist() == [False] * envs.num_envs
-    assert envs.step(still)[3].tolist() == [True] * envs.num_envs
-    *_, truncated, infos = envs.step(still * np.nan)  # the actions are ignored
+def tolerances_of_next_episodes(envs):
+    """Step to the end of episodes of two decisions, and into the next episodes."""
+    no_torque = np.zeros((envs.num_envs, 1))
+    assert envs.step(no_torque)[3].tolist() == [False] * envs.num_envs
+    assert envs.step(no_torque)[3].tolist() == [True] * envs.num_envs
+    *_, truncated, infos = envs.step(no_torque * np.nan)  # actions are ignored: episodes begin
     assert truncated.tolist() == [False] * envs.num_envs
     assert infos["state"].tolist() == np.zeros((envs.num_envs, 4)).tolist()
     return infos["goal_tolerance"].tolist()
@@ -117,23 +119,23 @@ def test_a_goal_tolerance_holds_from_the_next_episode_of_each_environment():
     envs = AcrobotSwingUpVectorEnv(2, config=AcrobotConfig(max_decisions=2))
     envs.reset()
     envs.goal_tolerance = GoalSchedule()(300)
-    assert end_episodes(envs) == [0.25, 0.25]  # 1 / (1 + 300 / 100), by the schedule
+    assert tolerances_of_next_episodes(envs) == [0.25, 0.25]  # 1 / (1 + 300 / 100), by the schedule
     envs.goal_tolerance = [0.1, 0.2]
     assert envs.step([[0.0], [0.0]])[4]["goal_tolerance"].tolist() == [0.25, 0.25]
-    envs.goal_tolerance[0] = 7.0  # a copy
+    envs.goal_tolerance[0] = 7.0  # changes a copy
     assert envs.reset()[1]["goal_tolerance"].tolist() == [0.1, 0.2]
 
 
 def test_modifying_returned_arrays_does_not_change_the_environment():
     envs = AcrobotSwingUpVectorEnv(2)
-    first = envs.reset()
-    copies = [first[0].copy(), first[1]["state"].copy(), first[1]["goal_tolerance"].copy()]
-    for array in (first[0], *first[1].values()):
+    observations, infos = envs.reset()
+    expected = copy.deepcopy((observations, infos))
+    for array in (observations, *infos.values()):
         array[:] = 1
-    second = envs.reset(seed=0)
-    np.testing.assert_array_equal(second[0], copies[0])
-    np.testing.assert_array_equal(second[1]["state"], copies[1])
-    np.testing.assert_array_equal(second[1]["goal_tolerance"], copies[2])
+    observations, infos = envs.reset(seed=0)
+    np.testing.assert_array_equal(observations, expected[0])
+    for name in ("state", "goal_tolerance"):
+        np.testing.assert_array_equal(infos[name], expected[1][name])
 
 
 def test_bad_actions_are_refused_by_index_and_change_nothing():
@@ -144,23 +146,21 @@ def test_bad_actions_are_refused_by_index_and_change_nothing():
     with pytest.raises(gym.error.ResetNeeded):
         envs.step(np.zeros((3, 1)))
     envs.reset()
-    for bad in (np.nan, np.inf, -np.inf, 1.01, -1.01):
-        actions = np.ones((3, 1))
-        actions[1] = bad
-        refuses("actions[1]", envs.step, actions)
+    for action in (np.nan, np.inf, -np.inf, 1.01, -1.01):
+        refuses("actions[1]", envs.step, [[1.0], [action], [1.0]])
     for shape in ((2, 1), (3, 2), (1, 3), ()):
         refuses("actions", envs.step, np.zeros(shape))
-    observations = envs.step(np.zeros(3))[0]
+    observations = envs.step(np.zeros(3))[0]  # hang at rest, in the middle of all ranges
     np.testing.assert_array_equal(observations, np.full((3, 4), 0.5))
 
 
 def test_bad_seeds_tolerances_and_masks_are_refused_by_name():
     envs = AcrobotSwingUpVectorEnv(2)
     refuses("seed", envs.reset, seed=[1, 2, 3])
-    for bad in (-0.1, [1.0, np.nan], [1.0] * 3):
-        refuses("goal_tolerance", envs.reset, options={"goal_tolerance": bad})
-        refuses("goal_tolerance", AcrobotSwingUpVectorEnv, 2, goal_tolerance=bad)
-        refuses("goal_tolerance", setattr, envs, "goal_tolerance", bad)
+    for tolerance in (-0.1, [1.0, np.nan], [1.0] * 3):
+        refuses("goal_tolerance", envs.reset, options={"goal_tolerance": tolerance})
+        refuses("goal_tolerance", AcrobotSwingUpVectorEnv, 2, goal_tolerance=tolerance)
+        refuses("goal_tolerance", setattr, envs, "goal_tolerance", tolerance)
     refuses("'episode'", envs.reset, options={"episode": 3})
     for mask in (np.zeros(2, bool), np.ones(3, bool), np.ones(2), "yes"):
         refuses("reset_mask", envs.reset, options={"reset_mask": mask})
@@ -170,7 +170,7 @@ def test_bad_seeds_tolerances_and_masks_are_refused_by_name():
 
 
 def test_gymnasiums_vector_wrappers_record_whole_episodes():
-    envs = RecordEpisodeStatistics(gym.make_vec(ID, num_envs=2, config=EASY))
+    envs = RecordEpisodeStatistics(gym.make_vec(ID, num_envs=2, config=LOW_GOAL))
     envs.reset()
     lengths = []
     for _ in range(30):
@@ -184,14 +184,14 @@ def test_a_batch_renders_every_environment_or_warns_without_a_mode(monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     envs, sync = batched_and_sync(2, render_mode="rgb_array")
     actions = np.array([[1.0], [-0.5]], np.float32)
-    for each in (envs, sync):
-        each.reset(seed=1)
-        each.step(actions)
-    assert_same(envs.render(), sync.render())
+    for vector in (envs, sync):
+        vector.reset(seed=1)
+        vector.step(actions)
+    assert_equal_bits(envs.render(), sync.render())
     envs.close()
     sync.close()
-    silent = AcrobotSwingUpVectorEnv(1)
-    silent.reset()
+    without_mode = AcrobotSwingUpVectorEnv(1)
+    without_mode.reset()
     with pytest.warns(UserWarning, match="render_mode"):
-        assert silent.render() is None
-    silent.close()
+        assert without_mode.render() is None
+    without_mode.close()
