@@ -72,11 +72,7 @@ def new_env(actions="discrete", unbounded=False):
 
 def new_agent(agent_class, env, **settings):
     approximator = SMALL if agent_class is SDNNQLearning else LinearSDNNConfig(averaging_interval=0)
-    spaces = (
-        getattr(env, "single_observation_space", env.observation_space),
-        getattr(env, "single_action_space", env.action_space),
-    )
-    return agent_class(*spaces, approximator=approximator, seed=3, warm_up_steps=60, **settings)
+    return agent_class(env, approximator=approximator, seed=3, warm_up_steps=60, **settings)
 
 
 @pytest.mark.parametrize("unbounded", [False, True], ids=["bounds", "warm-up"])
@@ -257,7 +253,7 @@ class Forgetful(gym.Wrapper):
 
 def test_missing_or_misshapen_masks_of_environments_are_unusable_steps():
     env = ActionMasks(gym.make("CartPole-v1"))  # CartPole has no masks
-    agent = SDNNQLambda(env.observation_space, env.action_space)
+    agent = SDNNQLambda(env)
     with pytest.raises(UnusableStepError, match="action_mask"):
         agent.train(env, steps=3)
     with pytest.raises(UnusableStepError, match="action_mask"):

@@ -61,13 +61,11 @@ class Points(gym.vector.VectorEnv):
 
 
 def trained(env):
-    observations = getattr(env, "single_observation_space", env.observation_space)
-    actions = getattr(env, "single_action_space", env.action_space)
-    return RBFQLearning(observations, actions, seed=1).train(env, steps=20)
+    return RBFQLearning(env, seed=1).train(env, steps=20)
 
 
 def evaluated(env):
-    return evaluate(RBFQLearning(env.observation_space, env.action_space, seed=1), env, 2)
+    return evaluate(RBFQLearning(env, seed=1), env, episodes=2)
 
 
 def with_value(name, value):

@@ -113,11 +113,11 @@ def test_values_are_those_of_a_semi_markov_process():
         np.testing.assert_allclose(agent.q_values([0.5]), [near, far], rtol=0.03)
 
 
-def random_steps(seed, n):
+def random_steps(seed, n_steps):
     """Yield transitions of episodes, half of which have a duration of 1."""
     rng = np.random.default_rng(seed)
     observation = rng.random(1)
-    for _ in range(n):
+    for _ in range(n_steps):
         action = int(rng.integers(2))
         next_observation, ends = rng.random(1), bool(rng.random() < 0.1)
         dt = float(rng.choice([1.0, rng.uniform(0.1, 9.0)]))
@@ -143,7 +143,7 @@ NEW_AGENTS = {
 @pytest.mark.parametrize("name", NEW_AGENTS)
 def test_durations_of_1_change_nothing_and_are_not_saved(name):
     without_durations, with_1, with_durations = (NEW_AGENTS[name]() for _ in range(3))
-    for transition in random_steps(1, 60):
+    for transition in random_steps(seed=1, n_steps=60):
         without_durations.learn(Transition(*transition[:5]))
         with_1.learn(transition._replace(dt=1.0))
         with_durations.learn(transition)
@@ -159,7 +159,7 @@ def test_an_agent_saved_between_transitions_of_any_duration_continues_with_the_s
     name, tmp_path
 ):
     agent, resumed = NEW_AGENTS[name](), NEW_AGENTS[name]()
-    for t, transition in enumerate(random_steps(2, 80)):
+    for t, transition in enumerate(random_steps(seed=2, n_steps=80)):
         agent.learn(transition)
         resumed.learn(transition)
         if t % 9 == 4:  # at various steps of episodes
@@ -184,7 +184,7 @@ def test_a_warm_up_keeps_durations_and_learns_them_when_it_is_over(agent_class, 
                 agent = load_agent(tmp_path / "agent.safetensors")
         return agent
 
-    steps = list(random_steps(3, 31))
+    steps = list(random_steps(seed=3, n_steps=31))
     agent = after_a_warm_up_of_30(steps[:30])
     assert not agent.is_warming_up
     without_warm_up = agent_class(
@@ -253,7 +253,7 @@ def test_durations_are_learned_from_a_vector_that_resets_its_environments_itself
 
 @pytest.mark.parametrize("name", ["dt", "dts"])
 def test_arrays_lines_and_tables_with_durations_are_learned_like_their_transitions(name, tmp_path):
-    steps = list(random_steps(4, 40))
+    steps = list(random_steps(seed=4, n_steps=40))
     agent = agent_and_courier(SDNNQLambda)[0]
     learn_from(agent, steps)
     observations, actions, rewards, next_observations, terminations, _, durations = map(

@@ -34,7 +34,7 @@ from sdnn.support.display import curve_svg
 def trained():
     """An agent, its environment, and the result of 1,500 steps; tests add a few steps."""
     env = gym.make("CartPole-v1")
-    agent = SDNNQLambda(env.observation_space, env.action_space, seed=1)
+    agent = SDNNQLambda(env, seed=1)
     return agent, env, agent.train(env, steps=1.5e3)
 
 
@@ -54,11 +54,11 @@ def test_predict_accepts_one_observation_or_a_batch(trained):
 
 def test_predict_accepts_batches_of_discrete_and_box_observations():
     lake = gym.make("FrozenLake-v1")
-    agent = SDNNQLambda(lake.observation_space, lake.action_space)
+    agent = SDNNQLambda(lake)
     assert agent.predict(np.array([0, 3, 5]))[0].shape == (3,)
     assert agent.predict(3)[0] in lake.action_space
     swing = gym.make("Pendulum-v1")
-    agent = SDNNQLambda(swing.observation_space, swing.action_space)
+    agent = SDNNQLambda(swing)
     assert agent.predict(np.zeros((4, 3), np.float32))[0].shape == (4, 1)
     assert agent.predict(np.zeros(3, np.float32))[0].shape == (1,)
 
@@ -198,7 +198,7 @@ def test_constructors_train_and_evaluate_accept_ids_and_refuse_unknown_ones():
 
 def test_seed_none_draws_a_different_seed_for_each_agent():
     env = gym.make("CartPole-v1")
-    first, second = (SDNNQLambda(env.observation_space, env.action_space, seed=None) for _ in "ab")
+    first, second = (SDNNQLambda(env, seed=None) for _ in "ab")
     assert first.seed != second.seed
 
 
@@ -284,7 +284,7 @@ def train_with_evaluations(means, *callbacks):
     """Train for 60 steps, with these mean returns of an evaluation after every 10 steps."""
     env = gym.make("CartPole-v1")
     agent = SDNNQLambda(
-        env.observation_space, env.action_space, inputs="all", angle_pairs="none",
+        env, inputs="all", angle_pairs="none",
         observation_range=(-3.0, 3.0), seed=2,
     )  # fmt: skip
     training = Training(
@@ -447,7 +447,7 @@ def test_step_intervals_below_1_and_fractions_are_refused(trained, interval):
 
 def test_a_training_calls_methods_replaced_on_the_instance():
     env = gym.make("CartPole-v1")
-    agent = SDNNQLambda(env.observation_space, env.action_space)
+    agent = SDNNQLambda(env)
     transitions, learn = [], agent.learn
     agent.learn = lambda transition: (transitions.append(transition), learn(transition))
     agent.train(env, steps=5)

@@ -103,7 +103,7 @@ def test_only_general_presets_without_codes_of_missing_values_find_a_history_by_
     assert finds_history(SDNNQLambda)
     assert not finds_history(SDNNQLambda, preset="paper", observation_range="adaptive")
     assert not finds_history(SDNNQLambda, missing="code")
-    assert finds_history(SDNNActorCritic, angle_pairs="find")
+    assert finds_history(SDNNActorCritic, angle_pairs="find")  # which needs a warm-up
     assert not finds_history(SDNNQLearning, observation_range="adaptive")
 
 

@@ -210,7 +210,7 @@ def test_weights_after_imitation_are_those_of_the_numpy_transcription(
     sizes = [n_actions] * n_dimensions
     slow, margin = QLambda(Code(agent.readout.code, 2), sizes, window, learning), 0.1 * scale
     for state, action, value, _, _ in random_transitions(seed, 25, sizes, scale):
-        torques = np.array(action) / (n_actions - 1)
+        torques = np.array(action) / (n_actions - 1)  # from 0 to 1
         agent._imitate_step(Transition(state, torques, 0.0, state, True), value, margin)
         imitate_in_numpy(slow, slow.code(state), action, value, margin)
         assert agent.readout.exponent == slow.exponent

@@ -138,6 +138,7 @@ def test_angle_pairs_and_angles_are_circular_inputs():
 
 
 def test_variables_of_discrete_spaces_cannot_be_angles():
+    # Variables 0 to 2 are a one-hot gear, 3 and 4 speeds, and others switches.
     refuses("angles", sdnn_agent, NESTED, angles=[1])
     refuses("angle_pairs", sdnn_agent, NESTED, angle_pairs=[(4, 5)])
 
@@ -201,9 +202,7 @@ class CartPoleWithNoise(gym.ObservationWrapper):
 
 def test_irrelevant_inputs_are_left_out_also_after_loading(tmp_path):
     env = CartPoleWithNoise(gym.make("CartPole-v1"), 6)
-    agent = SDNNQLearning(
-        env.observation_space, env.action_space, preset="small", seed=1, inputs="relevant"
-    )
+    agent = SDNNQLearning(env, preset="small", seed=1, inputs="relevant")
     agent.train(env, steps=1001, seed=1)  # inputs are chosen after a warm-up of 1,000
     chosen = [variables[0] for _, variables in agent.inputs]
     assert chosen[:4] == [0, 1, 2, 3]

@@ -212,7 +212,9 @@ def test_values_scale_exactly_with_rewards(scale):
         agent = _core.BareAgent(
             approximator=LinearSDNNConfig(**SMALL), n_actions=[3], learning=QLambdaConfig(), seed=1
         )
-        for state, action, reward, next_state, end in random_transitions(3, 200, [3], 2.0):
+        for state, action, reward, next_state, end in random_transitions(
+            3, 200, n_actions=[3], scale=2.0
+        ):
             agent.learn(state, action, reward * scale, next_state, end == "terminal")
         return agent.networks[0].values([0.2, 0.6])
 
@@ -236,7 +238,7 @@ def test_values_recover_from_an_outlier_reward():
 
 def test_cartpole_is_balanced_for_300_steps_after_20_000_steps():
     env = gym.make("CartPole-v1")
-    agent = SDNNQLambda(env.observation_space, env.action_space, seed=1)
+    agent = SDNNQLambda(env, seed=1)
     agent.train(env, steps=20_000, seed=1)
     assert evaluate(agent, gym.make("CartPole-v1"), episodes=10, seed=7).mean_return > 300
 
@@ -258,7 +260,7 @@ def test_a_warm_up_takes_place_only_where_inputs_can_be_chosen(space, is_searche
 
 def test_the_angle_of_pendulum_is_found_by_default():
     env = gym.make("Pendulum-v1")
-    agent = SDNNQLambda(env.observation_space, env.action_space, seed=1)
+    agent = SDNNQLambda(env, seed=1)
     agent.train(env, steps=1001, seed=1)
     assert agent.inputs == [("angle", [0, 1]), ("variable", [2])]
 
@@ -291,7 +293,7 @@ def test_inputs_that_become_relevant_later_are_added_also_after_loading(inputs, 
     agent.n_environments = 2
     resumed, observation = copy.deepcopy(agent), np.full(5, 0.3)
     inputs_after = {}  # by the number of steps
-    for n_steps, transition in enumerate(changing_task(1, 1700), start=1):
+    for n_steps, transition in enumerate(changing_task(seed=1, n_steps=1700), start=1):
         for learner in (agent, resumed):
             learner.learn(transition, environment=n_steps // 2 % 2)
         if n_steps % 170 == 20:  # during the warm-up, while transitions are remembered, and later
@@ -317,7 +319,7 @@ def test_inputs_that_become_relevant_later_are_added_also_after_loading(inputs, 
 def test_an_rbf_network_keeps_the_inputs_that_its_warm_up_chose():
     unit, three = gym.spaces.Box(0.0, 1.0, (5,), np.float64), gym.spaces.Discrete(3)
     agent = RBFQLearning(unit, three, inputs=[2], warm_up_steps=N_WARM_UP)
-    for t, transition in enumerate(changing_task(1, 850)):
+    for t, transition in enumerate(changing_task(seed=1, n_steps=850)):
         agent.learn(transition)
         if t == N_WARM_UP:
             chosen = agent.inputs

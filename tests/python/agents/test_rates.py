@@ -78,9 +78,7 @@ def schedule():
 def test_a_training_with_rates_set_by_callbacks_resumes_exactly(new_callback, env_id, tmp_path):
     def new_training(*callbacks):
         env = gym.make(env_id)
-        agent = SDNNQLearning(
-            env.observation_space, env.action_space, approximator=SMALL, warm_up_steps=50
-        )
+        agent = SDNNQLearning(env, approximator=SMALL, warm_up_steps=50)
         return Training(agent, env, steps=200, callbacks=[new_callback(), *callbacks])
 
     cuts = (1, 30, 49, 50, 51, 120, 199)
@@ -102,9 +100,7 @@ def test_a_schedule_sets_the_rates_by_the_progress_before_every_step():
             rates.append((agent.progress, agent.learning_rate, agent.epsilon))
 
     env = gym.make("Pendulum-v1")
-    agent = RBFQLearning(
-        env.observation_space, env.action_space, approximator=RBFNetworkConfig(n_actions=5)
-    )
+    agent = RBFQLearning(env, approximator=RBFNetworkConfig(n_actions=5))
     agent.train(env, steps=20, callbacks=[schedule(), NoteRates()])
     assert len(rates) == 1 + 20  # at the start and after every step
     for progress, rate, epsilon in rates:
@@ -115,9 +111,9 @@ def test_a_schedule_sets_the_rates_by_the_progress_before_every_step():
 def test_schedules_with_bad_functions_or_unsuitable_agents_are_refused():
     refuses("epsilon", Schedule, epsilon=0.1, error=TypeError)
     env = gym.make("Pendulum-v1")
-    agent = FuzzyQLearning(env.observation_space, env.action_space)
+    agent = FuzzyQLearning(env)
     schedule = Schedule(epsilon=lambda progress: 0.1)
     refuses("agent", agent.train, env, steps=5, callbacks=[schedule], error=TypeError)
-    agent = SDNNQLearning(env.observation_space, env.action_space, approximator=SMALL)
+    agent = SDNNQLearning(env, approximator=SMALL)
     too_large = Schedule(epsilon=lambda progress: 2.0)
     refuses("epsilon", agent.train, env, steps=5, callbacks=[too_large])

@@ -62,7 +62,7 @@ def test_concurrent_readers_get_the_bits_of_a_single_reader(name):
     # Random choices among equal values would depend on the order of the threads.
     agent = AGENTS[name](learning=AGENTS[name]().learning.replace(tie_rule="middle"))
     for seed in range(3):
-        train(agent, 40, seed)
+        train(agent, n_steps=40, seed=seed)
         for read in (read_values, read_greedy_actions):
             expected = read(agent)
             for values in run_in_threads(*[partial(read, agent)] * 4):
@@ -72,12 +72,12 @@ def test_concurrent_readers_get_the_bits_of_a_single_reader(name):
 @pytest.mark.parametrize("name", AGENTS)
 def test_concurrent_readers_do_not_change_learning(name):
     unread, agent = AGENTS[name](), AGENTS[name]()
-    train(unread, 300, 7)
+    train(unread, n_steps=300, seed=7)
     has_learned = threading.Event()
 
     def learn():
         try:
-            train(agent, 300, 7)
+            train(agent, n_steps=300, seed=7)
         finally:
             has_learned.set()
 

@@ -104,10 +104,7 @@ class Point(gym.Env):
 
 
 def corridor_agent(**options):
-    env = Corridor()
-    return SDNNQLearning(
-        env.observation_space, env.action_space, approximator=SMALL, seed=1, **options
-    )
+    return SDNNQLearning(Corridor(), approximator=SMALL, seed=1, **options)
 
 
 @pytest.mark.parametrize("name", AGENTS)
@@ -230,7 +227,7 @@ def test_errors_of_unusable_steps_name_the_environment_of_a_vector():
 def test_a_reward_of_1e300_causes_one_warning_and_is_not_learned():
     env = Broken(reward=1e300)
     env.action_space = gym.spaces.Box(-1.0, 1.0, (1,))
-    agent = FuzzyQLearning(env.observation_space, env.action_space)
+    agent = FuzzyQLearning(env)
     with pytest.warns(UserWarning, match=r"reward 1e\+300 of transition 11") as warned:
         agent.train(env, steps=40)
     assert len(warned) == 1
@@ -389,7 +386,7 @@ def test_resuming_skips_an_episode_whose_reset_failed(tmp_path):
         assert training.n_episodes == 2
         training = Training.load(path, FailsForSeeds(), callbacks=callbacks)
     assert training.run().n_episodes == 4
-    assert training.next_episode == 4 + len(bad_seeds)
+    assert training.next_episode == 4 + len(bad_seeds), "skipped episodes count"
 
 
 @pytest.mark.parametrize("n_envs", [1, 2])

@@ -71,23 +71,18 @@ class Unbounded(Walk):
 
 
 def sdnn_agent(env=None, **options):
-    env = env or Walk()
-    settings = {"approximator": SMALL, "learning": WITH_ALL_STATE, "seed": 3, **options}
-    return SDNNQLearning(env.observation_space, env.action_space, **settings)
+    learning = WITH_ALL_STATE
+    return SDNNQLearning(env or Walk(), approximator=SMALL, learning=learning, seed=3, **options)
 
 
 def rbf_agent():
-    sizes = RBFNetworkConfig(n_actions=7)
-    return RBFQLearning(Walk().observation_space, Walk.action_space, approximator=sizes)
+    return RBFQLearning(Walk(), approximator=RBFNetworkConfig(n_actions=7))
 
 
 def fuzzy_agent(env=None, **options):
-    env = env or Walk()
     learning = FuzzyQLearningConfig(trace_decay=0.7, n_greedy_steps=0, epsilon=0.3)
     sizes = FuzzyRulesConfig(n_sets=4)
-    return FuzzyQLearning(
-        env.observation_space, env.action_space, learning=learning, approximator=sizes, **options
-    )
+    return FuzzyQLearning(env or Walk(), learning=learning, approximator=sizes, **options)
 
 
 AGENTS = {
@@ -371,10 +366,7 @@ def test_steps_of_automatic_resets_are_not_learned():
 
 def test_gymnasiums_batched_cartpole_is_learned_without_the_steps_of_its_automatic_resets():
     envs = gym.make_vec("CartPole-v1", num_envs=3)  # no SyncVectorEnv
-    agent = SDNNQLearning(
-        envs.single_observation_space, envs.single_action_space, approximator=SMALL,
-        warm_up_steps=100,
-    )  # fmt: skip
+    agent = SDNNQLearning(envs, approximator=SMALL, warm_up_steps=100)
     result = agent.train(envs, steps=500, seed=1)
     assert not agent.is_warming_up
     assert all(row["return"] == row["length"] for row in result.rows), "a reset has reward 0"

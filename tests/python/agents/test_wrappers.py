@@ -1,5 +1,7 @@
 """Wrappers with running statistics: exact resuming, and evaluation with the trained statistics."""
 
+from types import SimpleNamespace
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -26,24 +28,18 @@ def wrapped(*wrappers):
     return env
 
 
-class CustomMoments:
-    def __init__(self):
-        self.mean, self.var, self.count = np.zeros(2), np.ones(2), 0.0
-
-
 class CustomNormalization(gym.ObservationWrapper):
     """A user's wrapper, whose statistics cannot be frozen."""
 
     def __init__(self, env):
         super().__init__(env)
-        self.obs_rms = CustomMoments()
+        self.obs_rms = SimpleNamespace(mean=np.zeros(2), var=np.ones(2), count=0.0)
 
     def observation(self, observation):
-        self.obs_rms.count += 1.0
-        self.obs_rms.mean = self.obs_rms.mean + (observation - self.obs_rms.mean) / (
-            self.obs_rms.count
-        )
-        return (observation - self.obs_rms.mean).astype(np.float32)
+        moments = self.obs_rms
+        moments.count += 1.0
+        moments.mean = moments.mean + (observation - moments.mean) / moments.count
+        return (observation - moments.mean).astype(np.float32)
 
 
 WRAPPERS = {
@@ -55,9 +51,7 @@ WRAPPERS = {
 
 
 def agent_for(env):
-    return RBFQLearning(
-        env.observation_space, env.action_space, seed=1, observation_range=(-2.0, 2.0)
-    )
+    return RBFQLearning(env, seed=1, observation_range=(-2.0, 2.0))
 
 
 @pytest.mark.parametrize("wrappers", WRAPPERS.values(), ids=WRAPPERS)

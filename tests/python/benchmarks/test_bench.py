@@ -155,13 +155,13 @@ def test_measurements_alternate_and_omit_cold_repetitions():
 
 
 def test_the_core_returns_a_time_for_each_repetition():
-    trial = measurements._short_trial(4, 0.0, 5)
-    times = _core.time_decisions(trial, 3)
+    trial = measurements._short_trial(n_inputs=4, noise=0.0, n_episodes=5)
+    times = _core.time_decisions(trial, n_episodes=3)
     assert times.dtype == np.int64
     assert times.size == trial.n_decisions
-    network_parts = _core.NetworkParts(trial.agent.networks[0], 1)
-    assert (network_parts.time_values(3) > 0).all()
-    assert _core.DenseProduct(5, 7, 1).run(0).size == 0
+    network_parts = _core.NetworkParts(trial.agent.networks[0], seed=1)
+    assert (network_parts.time_values(n_repetitions=3) > 0).all()
+    assert _core.DenseProduct(n_rows=5, n_columns=7, seed=1).run(n_repetitions=0).size == 0
 
 
 def test_unknown_processors_and_caches_are_no_error(tmp_path, monkeypatch, yardsticks):

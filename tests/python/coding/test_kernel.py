@@ -70,8 +70,10 @@ def test_the_kernel_and_similarities_use_fitted_codings_unchanged(coding, column
 
 def test_similarities_of_drawn_patterns_are_near_the_expected_correlations():
     for coding in ("random-inverse", "anchor", "circular", Symbolic(categories=("a", "b"))):
-        drawn, expected = kernel.similarity(coding, 4000, 1), kernel.correlations(coding, 4000)
+        drawn = kernel.similarity(coding, n_units=4000, seed=1)
+        expected = kernel.correlations(coding, n_units=4000)
         assert drawn.shape == expected.shape
+        # Means over 4,000 random units have a standard deviation of about 0.016.
         assert np.abs(drawn - expected).max() < 0.12
 
 

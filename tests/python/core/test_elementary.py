@@ -79,7 +79,7 @@ def test_the_arctangent_is_within_15_units_of_the_last_place():
     rng = np.random.default_rng(5)
     y, x = rng.uniform(-1.0, 1.0, (2, 6000))
     y[:2000] *= 2.0 ** rng.uniform(-300, 300, 2000)
-    # Ratios around 0.5, the centre of the core's reduction.
+    # Ratios around 1/2, beyond which the core uses another formula.
     y[2000:3000] = 0.5 * np.abs(x[2000:3000]) * (1.0 + rng.uniform(-1e-3, 1e-3, 1000))
     assert largest_error(_core.atan2(y, x), mpmath.atan2, y, x) < 1.5
 

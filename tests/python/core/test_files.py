@@ -33,7 +33,7 @@ def saved(tmp_path_factory):
     """The content of a file of each kind, and a function that reads such files."""
     folder = tmp_path_factory.mktemp("saved")
     env = gym.make("Pendulum-v1")
-    agent = SDNNQLearning(env.observation_space, env.action_space, approximator=agent_files.SMALL)
+    agent = SDNNQLearning(env, approximator=agent_files.SMALL)
     agent.save(folder / "agent")
     Training(agent, env, steps=5).save(folder / "training")
     samples = np.random.default_rng(0).uniform(size=(20, 2))

@@ -42,7 +42,7 @@ def make_run(folder, **changes):
 def test_export_does_not_import_modules_named_in_a_configuration(folder):
     make_run(folder / "run", environment={"id": "mine:Mine-v0"}, agent={"name": "nobody"})
     env = gym.make("Pendulum-v1")
-    agent = SDNNQLearning(env.observation_space, env.action_space, approximator=agent_files.SMALL)
+    agent = SDNNQLearning(env, approximator=agent_files.SMALL)
     agent.save(folder / "run" / "agent.safetensors")
     for source in ("run", "run/agent.safetensors"):
         assert modules_imported_by("export", source, "--c-header", "policy.h") == []

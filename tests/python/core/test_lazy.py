@@ -4,13 +4,12 @@ import ast
 import compileall
 import importlib
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 import sdnn
+from processes import python
 from sdnn import _core
 
 PACKAGES = ("sdnn", "sdnn.estimators", "sdnn.reproduction", "sdnn.runs")
@@ -36,10 +35,7 @@ def test_importing_sdnn_imports_no_large_package():
         "'rich', 'safetensors', 'scipy', 'sklearn', 'sdnn.runs', 'sdnn.reproduction'}\n"
         "print(large & {*sys.modules})"
     )
-    process = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    )
-    assert process.stdout == "set()\n"
+    assert python("-c", code).stdout == "set()\n"
 
 
 def test_an_installation_with_bytecode_but_no_sources_works(tmp_path):
@@ -53,5 +49,5 @@ def test_an_installation_with_bytecode_but_no_sources_works(tmp_path):
     code += "sys.meta_path[:] = sys.meta_path[-3:]  # not an editable installation's\n"
     code += "import sdnn, sdnn.runs, sdnn.reproduction; assert sdnn.__file__.endswith('.pyc')\n"
     code += "print(sdnn.runs.BudgetSpec().steps, sdnn.SDNNRegressor(), sdnn.SDNNKernelRidge())"
-    process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    process = python("-c", code)
     assert process.stdout == "None SDNNRegressor() SDNNKernelRidge()\n", process.stderr

@@ -1,8 +1,6 @@
 """The acrobot swing-up as a Gymnasium environment."""
 
 import itertools
-import subprocess
-import sys
 import warnings
 from typing import ClassVar
 
@@ -12,6 +10,7 @@ import pygame
 import pytest
 from gymnasium.utils.env_checker import check_env
 
+from processes import python
 from refusals import refuses
 from sdnn import _core
 from sdnn.environments import AcrobotConfig, AcrobotSwingUpEnv
@@ -55,16 +54,13 @@ def test_importing_the_environments_registers_them(imports, prefix):
         f"assert gymnasium.make({prefix + ID!r}).observation_space.shape == (4,)\n"
         f"assert gymnasium.make_vec({prefix + ID!r}, num_envs=2).num_envs == 2\n"
     )
-    process = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True
-    )
+    process = python("-W", "error", "-c", code)
     assert process.returncode == 0, process.stderr
 
 
 def test_a_missing_gymnasium_is_named():
     code = "import sys, sdnn; sys.modules['gymnasium'] = None; sdnn.environments"
-    process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert "gymnasium" in process.stderr.splitlines()[-1]
+    assert "gymnasium" in python("-c", code).stderr.splitlines()[-1]
 
 
 def test_the_spaces_are_unit_boxes_of_the_chosen_dtype():
