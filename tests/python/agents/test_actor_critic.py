@@ -170,7 +170,7 @@ def test_running_ranges_that_include_first_observations_of_episodes_let_an_agent
         action = agent.act(observation)
         rewards.append(1.0 if action == (observation[0] > 100.0) else -1.0)
         agent.learn(Transition(observation, action, rewards[-1], np.zeros(1), True))
-    assert np.mean(rewards[-300:]) > 0.7
+    assert np.mean(rewards[-300:]) > 0.7  # 0 by chance
 
 
 def test_traces_survive_alternating_environments_with_missing_values():

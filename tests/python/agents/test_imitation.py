@@ -44,7 +44,7 @@ def test_imitation_balances_cartpole_and_learning_keeps_it_balanced(agent_class)
     env = gym.make("CartPole-v1")
     agent = agent_class(env, seed=1)
     assert imitate(agent, cartpole_log(3000), epochs=5) == 15_000
-    assert evaluate(agent, env, episodes=10, seed=3).mean_return > 450
+    assert evaluate(agent, env, episodes=10, seed=3).mean_return > 450  # of at most 500
     agent.train(env, steps=2000, seed=4)
     assert evaluate(agent, env, episodes=10, seed=3).mean_return > 400
 

@@ -248,6 +248,7 @@ def test_inputs_of_noise_rank_last_and_have_no_influence_if_only_relevant_ones_a
     agent = SDNNQLambda(env, seed=100, inputs=inputs)
     agent.train(env, steps=12_000)
     order = influences_in(agent, env)
+    # Variables 0 to 3 are those of CartPole, 4 to 7 noise.
     assert {influence.input.columns[0] for influence in order[-4:]} == {4, 5, 6, 7}
     if inputs == "relevant":
         unused = [influence for influence in order if not influence.input.is_used]

@@ -89,7 +89,8 @@ def test_an_angle_is_coded_or_held_if_its_cosine_or_sine_is_missing():
     assert states == [states[0]] * 3
     agent = agent_of(SDNNQLambda, "hold", space, angle_pairs=[(0, 1)])
     agent.act([0.0, 1.0, 0.0])
-    assert state_of(agent, [1.0, np.nan, 0.0])[0] == 0.625  # cosine 1 and held sine 1: 45 degrees
+    # Cosine 1 and the held sine 1: 45 degrees in the range of -180 to 180.
+    assert state_of(agent, [1.0, np.nan, 0.0])[0] == (45 + 180) / 360
 
 
 def test_missing_values_are_refused_by_default_and_codes_by_agents_without_patterns():

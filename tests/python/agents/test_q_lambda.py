@@ -131,7 +131,7 @@ def test_excursions_resume_exactly_and_take_allowed_actions(when_saved, tmp_path
 
     # From step 4,000 on, both environments have excursions.
     resumed, n_in_excursions = run_with_saves(new_agent(), range(4200, 4400, 10))
-    assert n_in_excursions > 3
+    assert n_in_excursions > 3  # of 20 saves
     assert states_equal(run_with_saves(new_agent(), ())[0], resumed)
 
 
@@ -168,7 +168,7 @@ def test_steps_of_excursions_neither_change_weights_nor_count_as_learned(tmp_pat
         agent.learn(Transition(observation, action, rng.normal(), next_observation, False))
         if step >= 2000 and np.array_equal(agent.readout.weights(), before):
             n_left_out += 1
-    assert n_left_out > 50
+    assert n_left_out > 50  # of the last 500 steps
     assert agent.n_learned == n_steps - n_left_out
     agent.save(tmp_path / "agent.safetensors")
     assert load_agent(tmp_path / "agent.safetensors").n_learned == agent.n_learned
@@ -303,7 +303,7 @@ def test_inputs_that_become_relevant_later_are_added_also_after_loading(inputs, 
             continue
         assert np.array_equal(agent.q_values(observation), resumed.q_values(observation))
         left_out = agent.learning_report()["left_out"]
-        assert len(left_out) + len(agent.inputs) == 5
+        assert len(left_out) + len(agent.inputs) == 5, "all variables"
         if agent.inputs not in inputs_after.values():
             inputs_after[n_steps] = agent.inputs
     assert list(inputs_after) == [N_WARM_UP, 2 * N_WARM_UP]

@@ -600,7 +600,7 @@ def test_n_step_transitions_of_an_abandoned_episode_are_learned_on_resuming(tmp_
     action = by_hand.act(observation)
     next_observation, reward, terminated, _, _ = env.step(action)
     by_hand.learn(Transition(observation, action, reward, next_observation, terminated))
-    by_hand.progress = 1.0
+    by_hand.progress = 1.0  # of 21 steps
     assert states_equal(resumed.agent, by_hand)
 
 

@@ -170,7 +170,7 @@ def test_a_training_in_a_vector_equals_a_loop_by_hand(name):
 def test_an_agent_learns_the_same_in_all_classes_and_modes_of_vectors():
     expected = sdnn_agent()
     expected_rows = expected.train(sync_vector(3), steps=151, seed=2).rows
-    assert len(expected_rows) > 15
+    assert len(expected_rows) > 15, "episodes end during the training"
     for vector in vectors(3):
         agent = sdnn_agent()
         assert agent.train(vector, steps=151, seed=2).rows == expected_rows
@@ -395,11 +395,9 @@ def test_vectors_that_cannot_repeat_episodes_resume_with_new_ones_only(new_vecto
 
 def test_resuming_refuses_another_number_of_environments_or_other_observations(tmp_path):
     Training(sdnn_agent(), sync_vector(3), steps=50, callbacks=[Stop(20, tmp_path / "t")]).run()
-    for other in (sync_vector(2), Walk()):
-        refuses("env", Training.load, tmp_path / "t", other)
-    refuses(
-        "env", Training.load, tmp_path / "t", sync_vector(3, lambda: Walk(is_reproducible=False))
-    )
+    not_reproducible = sync_vector(3, lambda: Walk(is_reproducible=False))
+    for env in (sync_vector(2), Walk(), not_reproducible):
+        refuses("env", Training.load, tmp_path / "t", env)
     Training(sdnn_agent(), Walk(), steps=50, callbacks=[Stop(20, tmp_path / "t")]).run()
     refuses("env", Training.load, tmp_path / "t", sync_vector(3))
     assert Training.load(tmp_path / "t", sync_vector(1)).run().n_steps == 50
@@ -407,14 +405,8 @@ def test_resuming_refuses_another_number_of_environments_or_other_observations(t
 
 def test_without_repeating_a_training_resumes_in_any_number_of_environments(tmp_path):
     Training(sdnn_agent(), sync_vector(3), steps=50, callbacks=[Stop(20, tmp_path / "t")]).run()
-    for other in (
-        sync_vector(3),
-        sync_vector(2),
-        sync_vector(5),
-        Walk(),
-        ResetsItself(2, "NEXT_STEP"),
-    ):
-        training = Training.load(tmp_path / "t", other, repeat_episodes=False)
+    for env in (*map(sync_vector, (3, 2, 5)), Walk(), ResetsItself(2, "NEXT_STEP")):
+        training = Training.load(tmp_path / "t", env, repeat_episodes=False)
         assert training.n_steps == 20
         assert training.run().n_steps == 50
         assert training.agent.n_environments == training.n_environments

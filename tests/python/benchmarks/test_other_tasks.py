@@ -193,6 +193,7 @@ def test_a_failed_measurement_does_not_stop_others_or_change_the_packed_store(
     # Stored keys are not measured again: `abs` would fail.
     measured.measure_missing("squares", abs, keys, options_of(tmp_path))
     assert measured.measured("squares", tmp_path) == squares
+    # After a failure the new row is in the store, which is not packed then.
     packed = (tmp_path / measured.PACKED).read_bytes()
     with contextlib.suppress(RuntimeError), measured.opened(tmp_path) as store:
         store.put("squares", '["c", 3]', {"square": 9})

@@ -44,11 +44,11 @@ FITTED = {
 @pytest.mark.parametrize("name", FITTED)
 def test_patterns_are_signs_determined_by_the_seed(name):
     coding = FITTED[name]
-    patterns = coding.patterns(400, 7)
+    patterns = coding.patterns(400, seed=7)
     assert patterns.shape == (coding.size, 400)
     assert set(np.unique(patterns)) == {-1, 1}
-    np.testing.assert_array_equal(patterns, coding.patterns(400, 7))
-    assert not np.array_equal(patterns, coding.patterns(400, 8))
+    np.testing.assert_array_equal(patterns, coding.patterns(400, seed=7))
+    assert not np.array_equal(patterns, coding.patterns(400, seed=8))
 
 
 @pytest.mark.parametrize("name", FITTED)
@@ -57,7 +57,7 @@ def test_drawn_patterns_have_the_expected_correlations_up_to_chance(name):
     coding = FITTED[name]
     if isinstance(coding, RandomInverse):  # with fewer bins than for 10,000 units
         coding = dataclasses.replace(coding, n_flipped=100, n_bins=40)
-    drawn = coding.patterns(n_units, 3).astype(float)
+    drawn = coding.patterns(n_units, seed=3).astype(float)
     expected = coding.correlations(n_units)
     # Correlations of 10,000 random signs have a standard deviation of 0.01.
     assert np.abs(drawn @ drawn.T / n_units - expected).max() < 0.05
@@ -235,7 +235,7 @@ def test_missing_values_and_unknown_symbols_have_an_additional_last_bin():
     # Four bins from 0 to 4, and bin 4 for missing values.
     assert coding.bins(numbers).tolist() == [3, 4, 0, 4, 4]
     assert coding.bins(np.array([2.0, np.nan])).tolist() == [2, 4]
-    np.testing.assert_array_equal(coding.patterns(8, 5)[:-1], coding.base.patterns(8, 5))
+    np.testing.assert_array_equal(coding.patterns(8, seed=5)[:-1], coding.base.patterns(8, seed=5))
     letters = WithMissing(base=Symbolic()).fit(np.array(["b", None, "a"], dtype=object), 8)
     assert letters.bins(np.array(["a", "b", "new", None, ["a"]], dtype=object)).tolist() == [
         0, 1, 2, 2, 2,
@@ -264,8 +264,8 @@ def test_with_unknown_error_unknown_categories_are_refused():
 
 def test_patterns_of_12_000_symbols_are_balanced_and_extend_those_of_fewer():
     coding = Symbolic(categories=tuple(range(12_000))).fit(np.arange(12_000), 20)
-    patterns = coding.patterns(20, 3)
+    patterns = coding.patterns(20, seed=3)
     assert patterns.shape == (12_000, 20)
     assert (patterns.sum(axis=1) == 0).all()
-    fewer = Symbolic(categories=(0, 1, 2)).patterns(20, 3)
+    fewer = Symbolic(categories=(0, 1, 2)).patterns(20, seed=3)
     np.testing.assert_array_equal(patterns[:3], fewer)

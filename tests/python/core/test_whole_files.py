@@ -56,7 +56,7 @@ def test_only_partial_files_of_dead_processes_are_removed(tmp_path):
         try:
             assert process.stdout.readline() == b"half\n"
             before = partial_files(tmp_path)
-            assert len(before) == 2
+            assert len(before) == 2, "the partial file of the process, and the other file"
             remove_abandoned_files(tmp_path)
             assert partial_files(tmp_path) == before
         finally:

@@ -193,7 +193,7 @@ def test_rgb_array_list_has_25_frames_per_decision():
     env, frames = AcrobotSwingUpEnv(render_mode="rgb_array_list"), []
     of_decisions = AcrobotSwingUpEnv(render_mode="rgb_array")  # renders only after decisions
     assert env.metadata["render_fps"] == 25
-    assert of_decisions.metadata["render_fps"] == 4
+    assert of_decisions.metadata["render_fps"] == 4  # decisions of 1 s are shown faster
     env.reset()
     of_decisions.reset()
     for torque in (1.0, -1.0):
