@@ -118,15 +118,17 @@ def test_an_agent_that_finds_no_history_learns_the_bits_of_one_without(settings)
             gym.spaces.Box(-high, high),
         )
 
-    states = []
+    states = {}
     for history in ("auto", "none"):
         env = cartpole_with_noise_as_6_more_inputs()
         agent = SDNNQLambda(env, seed=1, history=history, **settings)
         agent.train(env, steps=2500, seed=1)  # relevant inputs are searched for repeatedly
         assert agent.history == "none"
-        states.append({k: v for k, v in agent.state().items() if k != "history.kind"})
-    assert states[0].keys() == states[1].keys()
-    assert all(np.array_equal(state, states[1][name]) for name, state in states[0].items())
+        states[history] = agent.state()
+        del states[history]["history.kind"]
+    assert states["auto"].keys() == states["none"].keys()
+    for name, array in states["auto"].items():
+        np.testing.assert_array_equal(array, states["none"][name])
 
 
 @pytest.mark.parametrize("history", ["differences", "averages", "observer"])

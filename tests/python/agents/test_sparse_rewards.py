@@ -91,6 +91,7 @@ def test_a_search_resumes_exactly(n_steps, tmp_path):
 
 
 def test_the_numpy_transcription_searches_with_the_same_actions_and_weights():
+    # The code of the agent.
     settings = transcription.Settings(seed=1, n_anchor_patterns=9, n_interpolated=44)
     slow = transcription.new_agent(2, [4], settings)
     agent = new_agent()

@@ -483,7 +483,7 @@ def test_sdnn_q_learning_learns_the_shortest_way_through_a_corridor():
     evaluation = evaluate(agent, Corridor(), 20, seed=3)
     assert evaluation.terminated.all()
     assert set(evaluation.lengths) <= {3, 4}, "from cell 0 or 1 straight to cell 4"
-    assert evaluation.mean_return == evaluation.returns.mean() > 0.6, "1 minus 0.1 for each step"
+    assert evaluation.mean_return == evaluation.returns.mean() > 0.6, "1 minus at most 3 * 0.1"
 
 
 def test_evaluations_report_mean_returns_and_do_not_change_what_is_learned():
