@@ -116,7 +116,7 @@ def test_every_setting_changes_what_an_agent_does_unless_listed(name, n_dimensio
     assert without_effect == listed.keys() & {field.name for _, field in fields}
 
 
-def test_schedules_follow_their_steps_or_without_them_the_progress_of_a_training():
+def test_schedules_by_steps_are_linear_and_those_without_steps_follow_the_progress():
     def agent(**learning):
         space = gym.spaces.Box(-1.0, 1.0, (3,), np.float64)
         return SDNNQLambda(space, gym.spaces.Discrete(2), learning=QLambdaConfig(**learning))

@@ -150,6 +150,7 @@ def test_a_wrapper_with_unknown_state_is_named_when_an_episode_cannot_be_repeate
     env = wrapped(AddsParity)
     training = Training(agent_for(env), env, steps=200, callbacks=[Stop(75, tmp_path / "training")])
     training.run()
+    # The second wrapper changes the observations of the episode that is repeated.
     with pytest.raises(UnrepeatedEpisodeError, match=r"AddsParity.*repeat_episodes=False"):
         Training.load(tmp_path / "training", wrapped(AddsParity, AddsParity))
     assert Training.load(tmp_path / "training", wrapped(), repeat_episodes=False)
