@@ -127,7 +127,7 @@ def test_sdnn_c_of_any_size_equals_its_transcription(
 
 
 def test_the_transcription_maps_counts_to_values_as_in_the_paper():
-    # Of a window's 300 units, 20 are active for the lowest value, -20, and 280 for the highest, 20.
+    # A window has 300 units: 20 are active for the lowest value, -20, and 280 for the highest, 20.
     settings, counts = transcription.Settings(), np.arange(301)
     expected = np.clip((2 * counts - 300) / 13, -20, 20)
     np.testing.assert_array_equal(transcription.g(counts, settings), expected)

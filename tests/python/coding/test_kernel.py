@@ -33,7 +33,7 @@ def test_the_kernel_of_one_and_two_inputs_is_as_worked_by_hand():
     coding = RandomInverse(n_bins=11, n_flipped=10, low=0.0, high=1.0)
     rho = 1 - 4 * 10 / 100  # correlation of neighbouring bins; of bins at distance 2, rho^2
     of_two = kernel.AnalyticKernel(coding, n_inputs=2, n_units=100)
-    # One bin apart in the first input; then also two bins apart in the second one.
+    # The first input differs by one bin; in the second sample the other one differs by two.
     matrix = of_two(np.array([[0.05, 0.05]]), np.array([[0.15, 0.05], [0.15, 0.25]]))
     # The mean of both orders of a pair: (1 + correlation of one) / 2 * correlation of the other.
     expected = [((1 + rho) / 2 + rho) / 2, ((1 + rho) / 2 * rho**2 + (1 + rho**2) / 2 * rho) / 2]
