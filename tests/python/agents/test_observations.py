@@ -80,7 +80,7 @@ def test_a_lower_bound_may_be_unknown_where_the_upper_one_is_known_and_the_other
     half_bounded = gym.spaces.Box(np.array([-np.inf, 0.0]), np.array([1.0, 1.0]), dtype=np.float64)
     settings = config(half_bounded)
     assert (settings.low, settings.high) == ((None, 0.0), (None, 1.0))
-    settings = config(UNBOUNDED, ([0.0, np.nan, -1.0], 2.0))
+    settings = config(UNBOUNDED, ([0.0, np.nan, -1.0], 2.0))  # NaN: an unknown bound
     assert (settings.low, settings.high) == ((0.0, None, -1.0), (2.0, None, 2.0))
 
 

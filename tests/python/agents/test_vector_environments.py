@@ -348,7 +348,7 @@ def test_steps_of_automatic_resets_are_not_learned():
         assert result.n_steps == 300
         assert len(result.rows) == result.n_episodes > 30
         recorders.append(recorder)
-    for i in range(n):
+    for i in range(n):  # a vector adds the number of an environment to its seed
         expected, generator, env = ["begin"], np.random.default_rng(i), Walk()
         observation, _ = env.reset(seed=episode_seed(6, 0, 0) + i)
         for _ in range(80):

@@ -88,7 +88,7 @@ def test_quantile_bins_hold_equal_shares_of_samples():
 
 
 def test_a_value_between_subnormal_knots_has_the_bin_of_the_next_knot():
-    # The slope between the knots is 0.5 / 1e-323, which is beyond all floats.
+    # Knots have the ranks 0, 1/2 and 1; the slope between the first two, 0.5 / 1e-323, is no float.
     coding = RandomInverse(spacing="quantile", n_bins=4).fit(np.array([-5e-324, 5e-324, 1.0]), 400)
     assert coding.bins(np.array([-1.0, -5e-324, 0.0, 5e-324, 0.5, 1.0])).tolist() == [
         0, 0, 2, 2, 3, 3,
