@@ -1,4 +1,4 @@
-"""An environment of one's own: two unbounded variables, chance of its own, one torque."""
+"""Environments of tests: a point with unbounded position and speed, and random drift."""
 
 import builtins
 
@@ -36,7 +36,7 @@ class DriftingEnv(gym.Env):
 
 
 class BrokenEnv(DriftingEnv):
-    """Has a reward of NaN at a step since it was made, or raises an error there."""
+    """At the step ``bad_step`` since it was made, give a reward of NaN, or raise the error."""
 
     def __init__(self, bad_step=250, error="", kind="RuntimeError", render_mode=None):
         super().__init__(render_mode=render_mode)
@@ -45,16 +45,16 @@ class BrokenEnv(DriftingEnv):
 
     def step(self, action):
         self.n_steps += 1
-        observation, reward, *ends = super().step(action)
+        observation, reward, *rest = super().step(action)
         if self.n_steps == self.bad_step and self.error:
             raise self.kind(self.error)
-        return observation, np.nan if self.n_steps == self.bad_step else reward, *ends
+        return observation, np.nan if self.n_steps == self.bad_step else reward, *rest
 
 
 class RestlessEnv(DriftingEnv):
-    """Drifts at random, whatever the seed, as a robot does, to the time limit; counts all steps."""
+    """Drift by unseeded random numbers, as a robot would; end at the time limit only."""
 
-    n_steps = 0
+    n_steps = 0  # of all objects
 
     def step(self, action):
         RestlessEnv.n_steps += 1
@@ -64,9 +64,9 @@ class RestlessEnv(DriftingEnv):
 
 
 class OnlyEnv(DriftingEnv):
-    """There is one of it, as of a robot: a second one cannot be made before the first is closed."""
+    """Refuse to be made while another one is open, as an environment of a robot."""
 
-    n_open = 0
+    n_open = 0  # objects
 
     def __init__(self, render_mode=None):
         if OnlyEnv.n_open:
@@ -79,7 +79,7 @@ class OnlyEnv(DriftingEnv):
 
 
 class UnseenEnv(gym.Env):
-    """Like docs/how-to/agents.md: nothing is said about rendering."""
+    """Environment without metadata of rendering, as in docs/how-to/agents.md."""
 
     observation_space = gym.spaces.Box(-1.0, 1.0, (2,), np.float64)
     action_space = gym.spaces.Box(-1.0, 1.0, (1,), np.float32)
@@ -93,7 +93,7 @@ class UnseenEnv(gym.Env):
 
 
 class CrowdedEnv(DriftingEnv):
-    """Shows four numbers of noise, too."""
+    """Append four random numbers to the observation."""
 
     observation_space = gym.spaces.Box(-np.inf, np.inf, (6,), np.float64)
 

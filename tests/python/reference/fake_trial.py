@@ -15,16 +15,15 @@ CASES = EXPERIMENTS[0].cases
 
 
 class FakeTrial:
-    """Steps fall from 50 to about 5; every number is fixed by the seed, not by the chunks."""
+    """Rows by the seed: after a few evaluations, their steps fall from 50 (failed) to about 5."""
 
     def __init__(self, *, protocol, seed, **_others):
         self._protocol = protocol
         n_tests = protocol.episodes // protocol.evaluate_every_episodes
         generator = np.random.default_rng(seed)
-        learned = generator.integers(2, 8)
-        self._steps = np.where(
-            np.arange(n_tests) < learned, 50, generator.integers(3, 8, n_tests)
-        ).astype(np.int32)
+        n_failed = generator.integers(2, 8)
+        self._steps = generator.integers(3, 8, n_tests).astype(np.int32)
+        self._steps[:n_failed] = 50
         self._returns = generator.normal(size=n_tests)
         self.episode = 0
 
@@ -40,11 +39,11 @@ class FakeTrial:
         self.episode = min(self.episode + n, self._protocol.episodes)
 
     def test_rows(self):
-        n_tests = self.episode // self._protocol.evaluate_every_episodes
+        evaluate_every = self._protocol.evaluate_every_episodes
+        n_tests = self.episode // evaluate_every
         steps = self._steps[:n_tests]
         return {
-            "episode": np.arange(1, n_tests + 1, dtype=np.int32)
-            * self._protocol.evaluate_every_episodes,
+            "episode": np.arange(1, n_tests + 1, dtype=np.int32) * evaluate_every,
             "steps": steps,
             "episode_return": self._returns[:n_tests],
             "solved": steps < 50,
@@ -52,13 +51,15 @@ class FakeTrial:
 
 
 class SlowTrial(FakeTrial):
+    """Trial that takes a millisecond for an episode, and advances by one at a time."""
+
     def advance(self, n):
         time.sleep(0.001)
         super().advance(1)
 
 
 class Recorder:
-    """An observer that notes what it hears; calls a function after the second finished trial."""
+    """Observer that records messages, and calls a function after the second finished trial."""
 
     def __init__(self, on_finished=None):
         self.events, self.notes, self.on_finished = [], [], on_finished
@@ -90,7 +91,7 @@ def make_plan(n_trials=3, n_episodes=300, root_seed=0):
 
 
 def agents_with(core_trial):
-    """All agents as they are, but for their trials."""
+    """Return the entries of all agents, with another class of trials."""
     return {name: replace(entry, core_trial=core_trial) for name, entry in AGENTS.items()}
 
 

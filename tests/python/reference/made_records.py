@@ -1,8 +1,10 @@
-"""A stored trial, made up, and what is left of a store whose writer was killed."""
+"""Records of trials that were never run, and changes of a store from outside."""
 
 import hashlib
+import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +16,14 @@ def hash_of(config):
     return hashlib.sha256(config.encode()).hexdigest()[:16]
 
 
+def execute(path, statement):
+    """Execute a statement of SQL as another program would, commit it, and return its first row."""
+    with closing(sqlite3.connect(path, isolation_level=None)) as connection:
+        return connection.execute(statement).fetchone()
+
+
 def make_record(trial=0, config="{}", steps=(50, 7), returns=None, **changes):
+    """Return a record whose evaluations, every 10 episodes, took these steps; 50 is a failure."""
     n = len(steps)
     rows = TrialRows.of_tests(
         episode=10 * np.arange(1, n + 1, dtype=np.int32),
@@ -46,6 +55,6 @@ os._exit(0)
 
 
 def hot_journal(path):
-    """Leave the journal of a process that was killed while it wrote."""
+    """Leave the database and journal of a process that was killed in its first transaction."""
     subprocess.run([sys.executable, "-c", KILLED, str(path)], check=True)
     return path.with_name(f"{path.name}-journal")

@@ -1,4 +1,4 @@
-"""Measurements for tests of benchmarks: a module that processes of their own can import."""
+"""Measurement for tests of benchmarks, in a module that worker processes can import."""
 
 import os
 

@@ -1,4 +1,4 @@
-"""Python in processes of their own, which find the modules that this one finds."""
+"""Separate processes of Python, which find the modules that this one finds."""
 
 import os
 import subprocess
@@ -7,11 +7,12 @@ from pathlib import Path
 
 
 def environment(**variables):
+    """Return the variables of this process, with its module path and further variables."""
     path = os.pathsep.join(str(Path(folder).resolve()) for folder in sys.path if folder)
     return os.environ | {"PYTHONPATH": path} | variables
 
 
 def python(*arguments, **options):
-    """Run Python to its end."""
+    """Run Python with these arguments to its end, and return the finished process."""
     settings = {"capture_output": True, "text": True, "check": False, "env": environment()}
     return subprocess.run([sys.executable, *map(str, arguments)], **(settings | options))

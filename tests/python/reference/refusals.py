@@ -1,4 +1,4 @@
-"""Errors name what they refuse: the one place where tests look at the words of a message."""
+"""Check of errors: only what a message must name is compared, not its other words."""
 
 import re
 
@@ -6,10 +6,9 @@ import pytest
 
 
 def refuses(name, call, /, *arguments, error=ValueError, **options):
-    """Check that a call is refused, and that the error names an argument, a file or a value.
+    """Check that a call raises an error whose message has ``name`` as a word; return the error.
 
-    No words around the name are looked at, so that messages can be written better. Returns the
-    error.
+    ``name`` is that of an argument or a file, or a value, so that messages can be reworded.
     """
     assert not re.search(r"[a-z] ", name), "a name, not words"
     with pytest.raises(error) as refused:

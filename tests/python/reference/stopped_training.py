@@ -1,4 +1,4 @@
-"""Training that stops anywhere and resumes: shared by tests of exact resuming."""
+"""Checks that a training that was stopped at any step resumes exactly."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from sdnn.agents import Callback, Training
 
 
 class Stop(Callback):
-    """Saves, where a path is given, and stops at a step."""
+    """Stop the training after the step ``at``; save it to ``path`` before, if there is one."""
 
     def __init__(self, at, path=None):
         self.at, self.path = at, path
@@ -18,9 +18,9 @@ class Stop(Callback):
             training.stop()
 
 
-def states_equal(state, other_state):
-    """Whether two agents have the same bits."""
-    state, other_state = state.state(), other_state.state()
+def states_equal(agent, other_agent):
+    """Return whether the states of two agents have the same bits."""
+    state, other_state = agent.state(), other_agent.state()
     assert state.keys() == other_state.keys()
     return all(
         state[name].dtype == other_state[name].dtype
@@ -30,9 +30,9 @@ def states_equal(state, other_state):
 
 
 def check_exact_resume(new_training, env, path, cuts, **options):
-    """Check that trainings of ``new_training(*callbacks)`` resume exactly after steps of ``cuts``.
+    """Check that trainings of ``new_training(*callbacks)`` resume exactly after the steps ``cuts``.
 
-    ``env()`` is the environment that a stopped one is loaded with. Returns the whole one.
+    ``env()`` makes the environment to load a training with. Returns an uninterrupted training.
     """
     whole = new_training()
     rows = whole.run().rows

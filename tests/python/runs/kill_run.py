@@ -1,7 +1,8 @@
 """Kills a run again and again by SIGKILL at random instants, then lets it end.
 
-Usage: kill_run.py FOLDER CONFIG KILLS SEED. Prints how many processes were killed, and at which
-steps they left a checkpoint. Processes are forked, so that instants are spread over the training.
+Usage: kill_run.py FOLDER CONFIG KILLS SEED. Prints the number of processes that were killed, and
+the steps of the checkpoints that they left. Processes are forked: a start of Python would take
+longer than the training.
 """
 
 import os
@@ -17,7 +18,7 @@ from sdnn.runs import Run
 from sdnn.runs.config_file import read_spec
 
 
-def steps_done(run):
+def steps_of_checkpoint(run):
     try:
         env, evaluation_env = (run.spec.environment.make() for _ in range(2))
         path = run.folder / "checkpoint.safetensors"
@@ -28,11 +29,11 @@ def steps_done(run):
 
 def main(folder, config, n_kills, seed):
     run = Run.create(folder, read_spec(config))
-    chance = random.Random(seed)
+    generator = random.Random(seed)
     began = time.perf_counter()
-    longest = 0.02  # seconds that a process has, at most; more where that is too little
-    killed, left = 0, [0]
-    while killed < n_kills or len(set(left)) < 4:
+    most_seconds = 0.02  # of a process; grows while processes are killed before a checkpoint
+    n_killed, saved_steps = 0, [0]
+    while n_killed < n_kills or len(set(saved_steps)) < 4:
         child = os.fork()
         if child == 0:
             code = 1
@@ -41,19 +42,19 @@ def main(folder, config, n_kills, seed):
                 code = 0
             finally:
                 os._exit(code)
-        time.sleep(chance.uniform(0.0, longest))
+        time.sleep(generator.uniform(0.0, most_seconds))
         os.kill(child, signal.SIGKILL)
         _, status = os.waitpid(child, 0)
         if os.WIFEXITED(status):
             assert os.WEXITSTATUS(status) == 0, "a resumed run failed"
-            break
-        killed += 1
-        left.append(steps_done(run))
-        if left[-1] == left[-2]:
-            longest *= 1.3
+            break  # the run ended before it was killed
+        n_killed += 1
+        saved_steps.append(steps_of_checkpoint(run))
+        if saved_steps[-1] == saved_steps[-2]:
+            most_seconds *= 1.3
         assert time.perf_counter() - began < 120.0
     run.train()
-    print(killed, *left)
+    print(n_killed, *saved_steps)
 
 
 if __name__ == "__main__":

@@ -43,9 +43,9 @@ def trained(invoke):
 
 
 def test_train_prints_a_summary_and_the_next_commands(invoke):
-    result = invoke("train", DRIFTING, *SHORT, "--seed", 3)
+    result = invoke("train", DRIFTING, *SHORT, "--seed", 3)  # 150 steps, evaluated every 70
     assert result.exit_code == 0, result.output
-    assert result.stderr == ""  # no progress where there is no terminal
+    assert result.stderr == "", "no progress bar where there is no terminal"
     folder = Path("runs/drifting_env-tests-Drifting-v0-sdnn-c-3")
     lines = result.stdout.splitlines()
     assert lines[0].startswith(f"{folder}: 150 steps, ")
@@ -83,7 +83,7 @@ def test_plot_writes_a_figure_and_the_numbers_of_its_curves(invoke, trained):
     ):  # fmt: skip
         values = [float(point["value"]) for point in drawn if point["kind"] == kind]
         assert values == [row[name] for row in rows if row["kind"] == row_kind]
-    assert figure.stat().st_size > 10_000
+    assert figure.stat().st_size > 10_000, "bytes of a picture that is not empty"
     assert "x.svg" in invoke("plot", trained, "--out", "x.svg").stdout
 
 
@@ -96,9 +96,9 @@ def test_record_writes_a_gif_of_the_requested_steps(invoke, trained, tmp_path):
 @pytest.mark.filterwarnings("ignore:.*render_mode")
 def test_record_refuses_environments_that_cannot_be_rendered(invoke, refused, tmp_path):
     result = invoke("train", "drifting_env:tests/Unseen-v0", *SHORT, "--out", "one")
-    commands = result.stdout.rpartition("next:")[2]
-    assert "sdnn plot one" in commands
-    assert "record" not in commands
+    proposed_commands = result.stdout.rpartition("next:")[2]
+    assert "sdnn plot one" in proposed_commands
+    assert "record" not in proposed_commands
     error = refused("record", "one", "x.gif", code=1)
     assert "drifting_env:tests/Unseen-v0 cannot be rendered" in error
     assert not (tmp_path / "x.gif").exists()
@@ -134,7 +134,7 @@ def test_export_with_learning_writes_the_header_of_a_linear_agent(invoke):
     assert f"{header.ram_bytes:,} bytes of memory" in result.stdout
 
 
-def test_export_writes_the_c_header_of_an_estimator(invoke, refused, tmp_path):
+def test_export_of_an_estimator_writes_its_c_header_and_refuses_bad_options(invoke, refused):
     X = np.random.default_rng(0).uniform(size=(60, 2))
     settings = {"n_pattern_units": 32, "max_iter": 3, "random_state": 0}
     models = {
@@ -173,7 +173,7 @@ def test_export_with_learning_refuses_a_network_without_a_weight_limit(refused, 
 def test_export_refuses_agents_trained_with_action_masks(invoke, refused):
     options = ("--agent", "q-lambda", "--steps", 60, "--evaluate-every", 0, "--out", "one")
     masks = ("--set", "environment.action_masks=true")
-    taxi = "Taxi-v4" if "Taxi-v4" in gym.registry else "Taxi-v3"  # before Gymnasium 1.3
+    taxi = "Taxi-v4" if "Taxi-v4" in gym.registry else "Taxi-v3"  # Gymnasium before 1.3 has v3
     assert invoke("train", taxi, *options, *masks).exit_code == 0
     for source in ("one", "one/agent.safetensors"):
         error = refused("export", source, "--c-header", "a.h", code=1)
@@ -196,12 +196,13 @@ def test_train_and_export_state_the_scaling_of_observations(invoke):
     assert "sdnn.runs.Run.open('one').spec.make_env()" in printed
     for source in ("one", "one/agent.safetensors", "one/checkpoint.safetensors"):
         result = invoke("export", source, "--c-header", "a.h")
-        assert [line.strip() for line in result.stdout.splitlines()[2:]] == SCALED_LINES
+        _file_and_memory, _introduction, *scaling = result.stdout.splitlines()
+        assert [line.strip() for line in scaling] == SCALED_LINES
         text = Path("a.h").read_text()
         assert text == c_header(Run.open("one").agent(), "a").text
-        comment, _ = text.split(" */\n", 1)
-        assert comment.startswith("/* What this policy observes is scaled, ")
-        assert [line.removeprefix(" *   ") for line in comment.splitlines()[4:]] == SCALED_LINES
+        introduction, scaling = text.split(" */\n", 1)[0].split(" *\n")  # of the first comment
+        assert introduction.startswith("/* What this policy observes is scaled, ")
+        assert [line.removeprefix(" *   ") for line in scaling.splitlines()] == SCALED_LINES
     printed = json.loads(invoke("export", "one", "--c-header", "a.h", "--json").stdout)
     assert printed["scaling"] == {"ranges": [[-4.0, 4.0], [-2.0, 3.0]], "redundant": 1}
 
@@ -209,7 +210,7 @@ def test_train_and_export_state_the_scaling_of_observations(invoke):
 def test_a_copied_agent_file_keeps_the_scaling_of_its_run(invoke):
     assert invoke("train", DRIFTING, *SHORT, *SCALED, "--out", "one").exit_code == 0
     Path("agent.safetensors").write_bytes(Path("one/agent.safetensors").read_bytes())
-    Path("config.json").write_text("of another program")
+    Path("config.json").write_text("a file of another program, which must not be read")
     printed = json.loads(
         invoke("export", "agent.safetensors", "--c-header", "a.h", "--json").stdout
     )
@@ -220,8 +221,9 @@ def test_a_copied_agent_file_keeps_the_scaling_of_its_run(invoke):
     environment = Run.open("one").spec.environment
     assert agent.scaling == pickle.loads(pickle.dumps(agent)).scaling == environment.scaling()
     assert evaluate(agent, environment.make(), 1).lengths.size == 1
-    for use in (evaluate, lambda agent, env: agent.train(env, steps=1)):
-        refuses("4", use, agent, gym.make("tests/Drifting-v0"))
+    unscaled_env = gym.make("tests/Drifting-v0")
+    refuses("UnitSensors", evaluate, agent, unscaled_env)
+    refuses("UnitSensors", agent.train, unscaled_env, steps=1)
 
 
 def test_unit_sensors_with_the_stated_scaling_fit_the_agent(invoke):
@@ -230,7 +232,7 @@ def test_unit_sensors_with_the_stated_scaling_fit_the_agent(invoke):
     agent = load_agent("one/agent.safetensors")
     env = UnitSensors(gym.make("tests/Drifting-v0"), *agent.scaling.ends)
     assert evaluate(agent, env, 1).lengths.size == 1
-    agent.scaling = None
+    agent.scaling = None  # the bounds of observations still differ: [0, 1] and unbounded
     refuses("env", evaluate, agent, gym.make("tests/Drifting-v0"), 1)
     refuses("scaling", setattr, agent, "scaling", 0, error=TypeError)
 
@@ -271,7 +273,8 @@ def test_plot_draws_several_runs_as_one_curve(invoke, tmp_path):
     for seed in (1, 2):
         assert invoke("train", DRIFTING, *SHORT, "--seed", seed).exit_code == 0
     folders = sorted((tmp_path / "runs").iterdir())
-    assert "curves.png and curves.csv" in invoke("plot", *folders, folders[0]).stdout
+    repeated = folders[0]
+    assert "curves.png and curves.csv" in invoke("plot", *folders, repeated).stdout
     drawn = list(csv.DictReader(Path("curves.csv").read_text().splitlines()))
     assert {(point["kind"], point["n_runs"], point["run"]) for point in drawn} == {
         ("evaluation", "2", ""), ("running median", "2", ""),
@@ -293,14 +296,12 @@ def test_plot_draws_goals_random_actions_and_baselines(invoke, refused, tmp_path
     assert "'PPO', 'SAC'" in refused("plot", "pole", "--baseline", "nobody", code=1)
 
 
-def test_plot_names_runs_without_rows(invoke, tmp_path):
-    for seed in (1, 2):
-        short = SHORT if seed == 1 else ("--dry-run", *SHORT)
-        values = invoke("train", DRIFTING, *short, "--seed", seed, "--out", f"run{seed}").stdout
-    config = json.loads(values)
+def test_plot_names_runs_without_rows(invoke):
+    assert invoke("train", DRIFTING, *SHORT, "--out", "run1").exit_code == 0
+    config = json.loads(invoke("train", DRIFTING, *SHORT, "--seed", 2, "--dry-run").stdout)
     del config["folder"]
     Path("run2").mkdir()
-    Path("run2/config.json").write_text(json.dumps(config))
+    Path("run2/config.json").write_text(json.dumps(config))  # a run that has not begun
     result = invoke("plot", "run1", "run2")
     assert (result.exit_code, "curves.png" in result.stdout) == (0, True)
     assert "run2" in result.stderr
@@ -330,7 +331,7 @@ def test_train_dry_run_prints_the_configuration_and_writes_nothing(invoke, tmp_p
     assert values["agent"] == {"name": "sdnn-c", "preset": "robust"}
     assert (values["budget"], values["protocol"]) == ({"episodes": 7}, {"evaluate_every": 0})
     assert values["output"] == {"checkpoint_every": 5}
-    assert "approximator" not in values  # as by default
+    assert "approximator" not in values, "the last --set of `circular` is the default"
     assert list(tmp_path.iterdir()) == []
 
 
@@ -339,7 +340,7 @@ def test_angle_pairs_find_makes_the_angle_of_pendulum_circular(invoke):
         "train", "Pendulum-v1", "--steps", 70, "--angle-pairs", "find", "--out", "one", *SMALL
     )
     assert result.exit_code == 0, result.output
-    assert Run.open("one").agent().approximator.circular == (True, False)
+    assert Run.open("one").agent().approximator.circular == (True, False)  # angle, speed
 
 
 def test_options_override_the_configuration_file(invoke, tmp_path):
@@ -391,6 +392,7 @@ def test_an_environment_module_may_register_an_agent(invoke, tmp_path, monkeypat
     try:
         result = invoke("train", "my_room:my/Room-v0", "--agent", "roomy", *short, "--out", "one")
         assert result.exit_code == 0, result.output
+        # In a new process, resuming has to import the module again.
         del AGENTS["roomy"], sys.modules["my_room"], gym.registry["my/Room-v0"]
         result = invoke("resume", "one", "--steps", 70)
         assert result.exit_code == 0, result.output
@@ -468,12 +470,12 @@ def test_a_missing_tensorboard_is_refused_before_training(refused, tmp_path, mon
     assert list(tmp_path.iterdir()) == []
 
 
-NOISY_FILE = """\
+NOISE_WITHOUT_RANGES = """\
 [environment]
 id = "CartPole-v1"
 noise = 0.1
 """
-FILE = """\
+BAD_KWARGS = """\
 agent = "rbf"
 [environment]
 id = "CartPole-v1"
@@ -482,8 +484,8 @@ kwargs.colour = 5
 [learning]
 discount = 0.5
 """
-WITHOUT_KWARGS = FILE.replace("kwargs.colour", "# ")
-VALID = WITHOUT_KWARGS.replace("9 =", "3 =")
+BAD_RANGE = BAD_KWARGS.replace("kwargs.colour", "# ")
+VALID = BAD_RANGE.replace("9 =", "3 =")
 
 
 @pytest.mark.parametrize(
@@ -493,20 +495,20 @@ VALID = WITHOUT_KWARGS.replace("9 =", "3 =")
         ('environment = "CartPole-v1"\nbudget.steps = "x"\n', "", "mine.toml:2: budget.steps: "),
         ('environment = "A"\n', "Nothing-v0", "Error: ENV_ID: no environment 'Nothing-v0'"),
         ('[environment]\nid = "Nothing-v0"\n', "", "mine.toml:2: environment.id: no environ"),
-        (FILE, "", "mine.toml:5: environment.kwargs: CartPole-v1 cannot be made"),
-        (FILE, "--env-arg max_episode_steps=9", "Error: --env-arg: CartPole-v1 cannot be made"),
-        (FILE, "Pendulum-v1", "mine.toml:5: environment.kwargs: Pendulum-v1 cannot be made"),
+        (BAD_KWARGS, "", "mine.toml:5: environment.kwargs: CartPole-v1 cannot be made"),
+        (BAD_KWARGS, "--env-arg max_episode_steps=9", "Error: --env-arg: CartPole-v1 cannot be"),
+        (BAD_KWARGS, "Pendulum-v1", "mine.toml:5: environment.kwargs: Pendulum-v1 cannot be made"),
         (
-            FILE.replace("colour", "max_episode_steps"),
+            BAD_KWARGS.replace("colour", "max_episode_steps"),
             "--env-arg shape=1",
             "Error: --env-arg: CartPole-v1 cannot be made",
         ),
-        (WITHOUT_KWARGS, "", "mine.toml:4: environment.ranges.9: CartPole-v1 has the variables 0"),
-        (FILE.replace("0.5", "1.5"), "", "mine.toml:7: learning.discount: must be in [0, 1], got"),
+        (BAD_RANGE, "", "mine.toml:4: environment.ranges.9: CartPole-v1 has the variables 0"),
+        (BAD_KWARGS.replace("0.5", "1.5"), "", "mine.toml:7: learning.discount: must be in [0, 1]"),
         (VALID, "--set learning.discount=2", "Error: --set learning.discount: must be in [0, 1]"),
         (VALID, "--range 8=0:1", "Error: --range 8: CartPole-v1 has the variables 0 to 3, got 8"),
-        (NOISY_FILE, "", "mine.toml:1: environment.ranges.1: must be given"),
-        (NOISY_FILE, "--range 0:1=1", "Error: --range must be"),
+        (NOISE_WITHOUT_RANGES, "", "mine.toml:1: environment.ranges.1: must be given"),
+        (NOISE_WITHOUT_RANGES, "--range 0:1=1", "Error: --range must be"),
         (
             "[agent]\nobservation_range = 'adaptive'\n",
             "CartPole-v1 --range 0:1",
@@ -555,18 +557,18 @@ class StrongerEnv(drifting_env.DriftingEnv):
 
 
 @pytest.mark.parametrize(
-    ("kind", "words"),
+    ("env_class", "words"),
     [
         (WiderEnv, "observation_space, Box(-inf, inf, (2,), float64), got"),
         (StrongerEnv, "action_space, Box(-1.0, 1.0, (1,), float32), got"),
     ],
 )
 def test_changed_spaces_of_an_environment_are_reported_in_one_line(
-    invoke, refused, monkeypatch, kind, words
+    invoke, refused, monkeypatch, env_class, words
 ):
-    short = (*SHORT, "--env-arg", "max_episode_steps=5")  # ends with an episode
-    assert invoke("train", DRIFTING, *short, "--out", "one").exit_code == 0
-    monkeypatch.setattr(gym.registry["tests/Drifting-v0"], "entry_point", kind)
+    whole_episodes = (*SHORT, "--env-arg", "max_episode_steps=5")  # 150 steps end with an episode
+    assert invoke("train", DRIFTING, *whole_episodes, "--out", "one").exit_code == 0
+    monkeypatch.setattr(gym.registry["tests/Drifting-v0"], "entry_point", env_class)
     for command in ("evaluate one", "record one x.gif", "resume one --steps 170"):
         assert words in refused(*command.split(), code=1)
 
@@ -575,7 +577,8 @@ BROKEN = "drifting_env:tests/Broken-v0"
 
 
 def test_a_reward_of_nan_is_reported_with_its_step_and_the_way_to_resume(invoke, refused):
-    # By default step 250 of an environment has a reward of NaN; a resumed run makes a new one.
+    # By default step 250 of an environment object has a reward of NaN, so 249 steps are learned
+    # from; a resumed run makes a new object, of which step 250 is not reached.
     options = ("--steps", 400, "--evaluate-every", 0, *SMALL)
     error = refused("train", BROKEN, *options, "--out", "one run", code=1)
     assert f"{BROKEN}: " in error
@@ -598,7 +601,7 @@ def test_a_reward_of_nan_in_an_evaluation_is_reported_in_one_line(invoke, refuse
 def test_scaling_observations_opens_no_second_environment(invoke):
     only = ("drifting_env:tests/Only-v0", *SHORT, "--redundant", 1, "--range", "all=-2:2")
     result = invoke("train", *only, "--evaluate-every", 0, "--out", "one")
-    assert result.exit_code == 0
+    assert result.exit_code == 0, "Only-v0 raises an error if two are open"
     assert "0 from -2 to 2, 1 from -2 to 2" in result.stdout
     scaling = load_agent("one/agent.safetensors").scaling
     assert scaling.ranges == ((-2.0, 2.0), (-2.0, 2.0))
@@ -607,7 +610,7 @@ def test_scaling_observations_opens_no_second_environment(invoke):
 def test_commands_without_evaluations_open_one_environment_at_a_time(invoke, refused):
     only = ("drifting_env:tests/Only-v0", *SHORT)
     assert invoke("train", *only, "--evaluate-every", 0, "--out", "one").exit_code == 0
-    for command in (
+    for command in (  # Only-v0 raises an error if two are open
         "resume one --steps 170",
         "resume one --steps 190 --new-episode",
         "evaluate one --episodes 1",
@@ -624,7 +627,7 @@ def test_commands_without_evaluations_open_one_environment_at_a_time(invoke, ref
 
 
 def test_resume_with_new_episode_repeats_no_steps(invoke, refused):
-    restless = ("drifting_env:tests/Restless-v0", *SHORT, "--evaluate-every", 0)
+    restless = ("drifting_env:tests/Restless-v0", *SHORT, "--evaluate-every", 0)  # has no seed
     assert invoke("train", *restless, "--steps", 70, "--out", "one run").exit_code == 0
     error = refused("resume", "one run", "--steps", 100, code=1)
     assert "env " in error
@@ -637,16 +640,15 @@ def test_resume_with_new_episode_repeats_no_steps(invoke, refused):
     assert [row["episode"] for row in rows] == list(range(len(rows)))
 
 
-@pytest.mark.parametrize("kind", ["RuntimeError", "TimeoutError", "BrokenPipeError"])
-def test_an_error_of_an_environment_is_raised_with_its_traceback(invoke, kind):
-    failing = ("--env-arg", "error=stalled", "--env-arg", f"kind={kind}")
-    short = ("--steps", 400, "--evaluate-every", 0, *SMALL)
-    arguments = ("train", BROKEN, *failing, *short, "--out", "one run")
-    result = invoke(*arguments, catch_exceptions=True)
+@pytest.mark.parametrize("error_type", ["RuntimeError", "TimeoutError", "BrokenPipeError"])
+def test_an_error_of_an_environment_is_raised_with_its_traceback(invoke, error_type):
+    failing = ("--env-arg", "error=stalled", "--env-arg", f"kind={error_type}")  # at step 250
+    options = ("--steps", 400, "--evaluate-every", 0, *SMALL, "--out", "one run")
+    result = invoke("train", BROKEN, *failing, *options, catch_exceptions=True)
     assert isinstance(result.exception, RuntimeError)
     assert "sdnn resume 'one run'" in result.stderr
     error = result.exception.__cause__ or result.exception
-    assert type(error).__name__ == kind
+    assert type(error).__name__ == error_type
     assert traceback.extract_tb(error.__traceback__)[-1].filename.endswith("drifting_env.py")
     run = Run.open("one run")
     env = run.spec.make_training_env()
@@ -655,12 +657,12 @@ def test_an_error_of_an_environment_is_raised_with_its_traceback(invoke, kind):
 
 def test_a_full_standard_output_is_reported_in_one_line(trained):
     command = f"{sys.executable} -m sdnn resume {trained} --json"
-    for out, errors in (("> /dev/full", "Error: [Errno 28] No space left"), ("| true", "")):
-        process = subprocess.run(
-            ["sh", "-c", f"{command} {out}"], env=environment(), capture_output=True, text=True
-        )
-        assert process.stderr.startswith(errors), process.stderr
-        assert process.stderr.count("\n") == bool(errors), process.stderr
+    closed_pipe = ("| true", "")  # no error: the reader wants no more
+    for redirection, error in (("> /dev/full", "Error: [Errno 28] No space left"), closed_pipe):
+        shell = ["sh", "-c", f"{command} {redirection}"]
+        process = subprocess.run(shell, env=environment(), capture_output=True, text=True)
+        assert process.stderr.startswith(error), process.stderr
+        assert process.stderr.count("\n") == bool(error), process.stderr
 
 
 def test_train_does_not_overwrite_runs_or_files(refused, trained):
@@ -721,8 +723,8 @@ def test_train_reports_observations_that_are_left_out(invoke):
     options = ["--agent", "q-lambda", "--steps", 1001, "--evaluate-every", 0]
     result = invoke("train", "drifting_env:tests/Crowded-v0", *options, "--out", "one", "--json")
     left_out = json.loads(result.stdout)["learning_report"]["left_out"]
-    assert len(left_out) >= 3
-    assert set(left_out) <= {2, 3, 4, 5}, "inputs of noise"
+    assert len(left_out) >= 3, "most of the four inputs of noise"
+    assert set(left_out) <= {2, 3, 4, 5}, "nothing but inputs of noise"
     listed = f"{len(left_out)} of 6 observations.*: {', '.join(map(str, left_out))}"
     assert re.search(listed, invoke("resume", "one").stdout)
     options[1] = "sdnn-c"  # uses all inputs by default
@@ -731,8 +733,9 @@ def test_train_reports_observations_that_are_left_out(invoke):
 
 
 def test_commands_report_an_unfinished_warm_up(invoke):
-    warm_up_begun = ("--steps", 59, "--evaluate-every", 50, "--evaluation-episodes", 1, *SMALL)
-    lines = invoke("train", DRIFTING, *warm_up_begun, "--out", "one").stdout.splitlines()
+    # The agent warms up for 60 steps: training stops one step earlier, and is resumed to the 60th.
+    before_the_end = ("--steps", 59, "--evaluate-every", 50, "--evaluation-episodes", 1, *SMALL)
+    lines = invoke("train", DRIFTING, *before_the_end, "--out", "one").stdout.splitlines()
     assert lines[1].startswith(WARMING_UP)
     assert "60 steps" in lines[1]
     assert "sdnn resume one --steps N" in lines[1]
@@ -755,8 +758,8 @@ def test_resume_accepts_later_goals_and_refuses_earlier_or_conflicting_ones(invo
     assert "150 steps" in invoke("resume", "one").stdout
     assert json.loads(invoke("resume", "one", "--steps", 170, "--json").stdout)["n_steps"] == 170
     assert "--steps: " in refused("resume", "one", "--steps", 9, code=2)
-    both = ("--steps", 900, "--episodes", 900)
-    assert "--episodes: " in refused("resume", "one", *both, code=2)
+    two_goals = ("--steps", 900, "--episodes", 900)
+    assert "--episodes: " in refused("resume", "one", *two_goals, code=2)
 
 
 @pytest.mark.parametrize("command", ["resume {}", "evaluate {}", "plot {}", "record {} x.gif"])
@@ -810,8 +813,7 @@ def test_a_run_stopped_by_a_signal_resumes_exactly(invoke, tmp_path, number, cod
     assert "sdnn resume cut" in errors
     assert errors.count("\n") == 1
     assert not (tmp_path / "cut" / "agent.safetensors").exists()
-    cut_at = Run.open("cut").rows()[-1]["step"]
-    assert cut_at < 3000
+    assert Run.open("cut").rows()[-1]["step"] < 3000, "stopped before its end"
     assert invoke("resume", "cut").exit_code == 0
     assert invoke("train", *long, "--out", "whole").exit_code == 0
     for name in ("agent.safetensors", "checkpoint.safetensors"):

@@ -17,8 +17,8 @@ from sdnn.runs.trial import TrialRows
 CONFIG = run_spec(environment=EnvironmentSpec(id="CartPole-v1"))
 
 
-def fake_run(folder, config, returns=(), evaluations=(), every=20):
-    """Make a run that nobody trained: an episode every 10 steps, an evaluation every 20 or so."""
+def fake_run(folder, config, returns=(), evaluations=(), evaluate_every=20):
+    """Make a run without training: returns of episodes of 10 steps, and those of evaluations."""
     run = Run.create(folder, config)
     rows = [
         {"kind": "episode", "step": 10 * n, "episode": n - 1, "return": float(value), "length": 10,
@@ -26,8 +26,9 @@ def fake_run(folder, config, returns=(), evaluations=(), every=20):
         for n, value in enumerate(returns, 1)
     ]  # fmt: skip
     rows += [
-        {"kind": "evaluation", "step": every * n, "episode": n - 1, "returns": list(values),
-         "lengths": [10] * len(values), "terminated": [True] * len(values)}
+        {"kind": "evaluation", "step": evaluate_every * n, "episode": n - 1,
+         "returns": list(values), "lengths": [10] * len(values),
+         "terminated": [True] * len(values)}
         for n, values in enumerate(evaluations, 1)
     ]  # fmt: skip
     settings = {"config": run.spec.canonical_json(), "version": "0.1"}
@@ -43,7 +44,7 @@ def test_a_single_run_has_curves_of_returns_running_medians_and_evaluations(tmp_
     assert (returns.kind, returns.steps.tolist(), returns.values.tolist()) == (
         "return", [10, 20, 30], [1, 5, 3],
     )  # fmt: skip
-    assert (medians.kind, medians.values.tolist()) == ("running median", [1, 3, 3])
+    assert (medians.kind, medians.values.tolist()) == ("running median", [1, 3, 3])  # of 1, 5, 3
     assert (evaluations.kind, evaluations.steps.tolist()) == ("evaluation", [20, 40])
     # The means of the evaluations; low and high are the quartiles of their returns.
     assert evaluations.values.tolist() == [4, 5]
@@ -65,7 +66,7 @@ def test_runs_of_one_task_are_one_curve_with_quartiles(tmp_path):
     ]
     *_, curve = curves_of(runs)[0]
     assert (curve.kind, curve.n_runs) == ("evaluation", 3)
-    assert curve.steps.tolist() == [20, 40]  # which all of them have
+    assert curve.steps.tolist() == [20, 40], "the steps at which all runs were evaluated"
     # Medians and quartiles over the runs of the means 0, 2, 4 and 1, 1, 3.
     assert curve.values.tolist() == [2, 1]
     assert curve.low.tolist() == [1, 1]
@@ -93,20 +94,20 @@ def test_running_medians_of_long_runs_have_few_points(tmp_path):
     runs = [fake_run(tmp_path / str(n), run_spec(CONFIG, seed=n), range(2_000)) for n in range(2)]
     medians = curves_of(runs)[0][-1]
     assert len(medians.steps) == MAX_POINTS
-    assert medians.steps[[0, -1]].tolist() == [10, 20_000]
+    assert medians.steps[[0, -1]].tolist() == [10, 20_000]  # an episode has 10 steps
     assert medians.values[-1] == np.median(range(1_980, 2_000))
 
 
 def test_legends_name_each_agent_and_each_type_of_line_once(tmp_path):
-    other = run_spec(CONFIG, settings={"learning": {"discount": 0.9}})
+    other_agent = run_spec(CONFIG, settings={"learning": {"discount": 0.9}})
     runs = [
         fake_run(tmp_path / f"{n}-{seed}", run_spec(spec, seed=seed), [1, 2], [[3]])
-        for n, spec in enumerate((CONFIG, other))
+        for n, spec in enumerate((CONFIG, other_agent))
         for seed in range(2)
     ]
     (legend,) = draw_curves(curves_of(runs)[0]).legends
     texts = [text.get_text() for text in legend.get_texts()]
-    assert len(texts) == len(set(texts)) == 2 + 3
+    assert len(texts) == len(set(texts)) == 2 + 3  # agents, and return, median and evaluation
 
 
 def test_runs_of_other_tasks_or_settings_are_separate_curves(tmp_path):
@@ -119,10 +120,10 @@ def test_runs_of_other_tasks_or_settings_are_separate_curves(tmp_path):
             kwargs={"max_episode_steps": 9},
         ),
     )
-    set_otherwise = run_spec(CONFIG, settings={"learning": {"discount": 0.9}})
+    other_discount = run_spec(CONFIG, settings={"learning": {"discount": 0.9}})
     runs = [
         fake_run(tmp_path / str(n), config, [1])
-        for n, config in enumerate((CONFIG, noisy, set_otherwise))
+        for n, config in enumerate((CONFIG, noisy, other_discount))
     ]
     curves = curves_of(runs)[0]
     discount = CONFIG.learning.discount
@@ -134,7 +135,7 @@ def test_runs_of_other_tasks_or_settings_are_separate_curves(tmp_path):
             f"sdnn-c general, discount={discount}",
         ),
     }
-    assert len(draw_curves(curves).axes) == 2
+    assert len(draw_curves(curves).axes) == 2, "one for each of the two tasks"
 
 
 def configs_that_differ():
@@ -157,16 +158,16 @@ def configs_that_differ():
 
 def test_only_runs_that_differ_in_seed_and_output_are_grouped(tmp_path):
     configs = list(configs_that_differ())
-    folders = {}
+    number_of_config = {}
     for n, config in enumerate(configs):
         for seed in (1, 2):
             folder = tmp_path / f"{n}-{seed}"
             Run(folder, config).folder.mkdir()
             other = run_spec(config, seed=seed, checkpoint_every=seed, tensorboard=seed == 2)
             (folder / "config.json").write_text(json.dumps(other.values()))
-            folders[folder] = n
-    groups = groups_of([Run.open(folder) for folder in folders])
-    assert [[folders[run.folder] for run in group.runs] for group in groups] == [
+            number_of_config[folder] = n
+    groups = groups_of([Run.open(folder) for folder in number_of_config])
+    assert [[number_of_config[run.folder] for run in group.runs] for group in groups] == [
         [n, n] for n in range(len(configs))
     ]
     assert len({(group.task, group.agent) for group in groups}) == len(groups)
@@ -175,14 +176,15 @@ def test_only_runs_that_differ_in_seed_and_output_are_grouped(tmp_path):
 def test_names_of_groups_state_their_different_settings(tmp_path):
     long = run_spec(CONFIG, steps=600)
     short = run_spec(CONFIG, steps=300)
-    goals = {
+    specs_and_later_goals = {
         "a": (long, []),
         "b": (short, []),
         "c": (short, [Goal(at_step=300, steps=600)]),
         "d": (short, [Goal(at_step=150, steps=600)]),
         "e": (run_spec(short, n_envs=4), []),
     }
-    groups = groups_of([Run(tmp_path / name, *parts) for name, parts in goals.items()])
+    runs = [Run(tmp_path / name, *parts) for name, parts in specs_and_later_goals.items()]
+    groups = groups_of(runs)
     assert [group.agent.removeprefix("sdnn-c general, ") for group in groups] == [
         "600 steps, n_envs=1",
         "300 steps, n_envs=1",
@@ -206,7 +208,7 @@ def test_later_goals_at_steps_that_depend_on_the_seed_keep_runs_grouped(tmp_path
 
 def test_runs_evaluated_at_different_steps_are_separate_curves(tmp_path):
     runs = [
-        fake_run(tmp_path / f"{n}", run_spec(CONFIG, evaluate_every=n), [1, 2], [[3]], every=n)
+        fake_run(tmp_path / f"{n}", run_spec(CONFIG, evaluate_every=n), [1, 2], [[3]], n)
         for n in (500, 700)
     ]
     third = run_spec(CONFIG, environment=EnvironmentSpec(id="Acrobot-v1"))
@@ -226,7 +228,7 @@ def test_runs_of_different_lengths_keep_their_lengths(tmp_path):
     runs = [
         fake_run(tmp_path / str(n), run_spec(CONFIG, steps=20 * n), [], [[3]] * n) for n in (2, 5)
     ]
-    assert [curve.steps[-1] for curve in curves_of(runs)[0]] == [40, 100]
+    assert [curve.steps[-1] for curve in curves_of(runs)[0]] == [20 * 2, 20 * 5]
 
 
 def test_notes_name_runs_and_evaluations_that_are_omitted(tmp_path):
@@ -250,16 +252,12 @@ def test_notes_name_runs_and_evaluations_that_are_omitted(tmp_path):
         ("running median", 2, ""), ("evaluation", 1, str(whole.folder)),
     ]  # fmt: skip
     assert [note.partition(":")[0] for note in notes] == [str(begun.folder)]
-    late = fake_run(tmp_path / "late", run_spec(CONFIG, seed=9), [], [[1]], every=30)
+    late = fake_run(tmp_path / "late", run_spec(CONFIG, seed=9), [], [[1]], evaluate_every=30)
     curves, notes = curves_of([short, late])
     assert {curve.kind for curve in curves} == {"return", "running median"}
     assert notes == [f"{short.folder}, {late.folder}: their evaluations have no step in common"]
-    refuses(
-        empty.folder.name,
-        curves_of,
-        [empty, fake_run(tmp_path / "new", CONFIG)],
-        error=RunError,
-    )
+    also_empty = fake_run(tmp_path / "new", CONFIG)
+    refuses(empty.folder.name, curves_of, [empty, also_empty], error=RunError)
 
 
 def test_figures_and_csv_files_are_written_in_every_format(tmp_path):

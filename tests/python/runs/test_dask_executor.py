@@ -18,21 +18,26 @@ from sdnn.runs.engine import Failed, Finished, run_to_end
 pytest.importorskip("distributed", reason="needs Dask")
 
 
-def test_probes_differ_between_trials_and_contain_their_settings():
-    first, second = plan_trials(EXPERIMENTS[0].cases, 1, 0, 30)
+def plan_two_trials():
+    """Plan a short trial of each of two cases."""
+    return plan_trials(EXPERIMENTS[0].cases, n_trials=1, root_seed=0, n_episodes=30)
+
+
+def test_probes_which_compare_builds_differ_between_trials_and_contain_their_settings():
+    first, second = plan_two_trials()
     assert probe(first) == probe(first) != probe(second)
     assert first.spec.canonical_json() in probe(first)
 
 
 def test_trials_that_cannot_be_pickled_are_refused():
-    plan = plan_trials(EXPERIMENTS[0].cases, 1, 0, 30)
-    object.__setattr__(plan[0], "lock", threading.Lock())
+    plan = plan_two_trials()
+    object.__setattr__(plan[0], "lock", threading.Lock())  # no lock can be pickled
     refuses("lock", probes_of, plan, error=ClusterError)
 
 
 def test_results_of_another_version_or_trial_count_as_failures():
-    first, second = plan_trials(EXPERIMENTS[0].cases, 1, 0, 10)
-    *_, (_, record) = run_to_end(first)
+    first, second = plan_two_trials()
+    *_, (_, record) = run_to_end(first)  # its last message is Finished(first, record)
 
     def result_of(planned, record):
         future = SimpleNamespace(status="finished")
@@ -54,20 +59,20 @@ def closed_port():
         yield server.getsockname()[1]  # bound, but nobody listens
 
 
-@pytest.mark.parametrize("kind", ["address", "scheme", "missing", "malformed"])
-def test_errors_of_the_connection_name_the_scheduler(tmp_path, closed_port, kind):
+@pytest.mark.parametrize("problem", ["closed port", "scheme", "missing file", "malformed file"])
+def test_errors_of_the_connection_name_the_scheduler(tmp_path, closed_port, problem):
     path = tmp_path / "scheduler.json"
     scheduler = {
-        "address": f"127.0.0.1:{closed_port}",
+        "closed port": f"127.0.0.1:{closed_port}",
         "scheme": "carrier-pigeon://loft",
-        "missing": str(path),
-        "malformed": str(path),
-    }[kind]
-    if kind == "malformed":
+        "missing file": str(path),
+        "malformed file": str(path),
+    }[problem]
+    if problem == "malformed file":
         path.write_text("[]")
     executor = DaskExecutor(scheduler, scheduler_timeout=1.0)
     with pytest.raises(ClusterError) as caught:
-        list(executor.run(plan_trials(EXPERIMENTS[0].cases, 1, 0, 30), threading.Event()))
+        list(executor.run(plan_two_trials(), threading.Event()))
     assert scheduler in str(caught.value)
 
 

@@ -34,11 +34,11 @@ def test_the_number_of_jobs_does_not_change_the_stored_rows(tmp_path, run):
 
 def plan_of_small_agents(n_trials, n_episodes):
     cases = EXPERIMENTS[1].with_agents(["fuzzy", "sdnn-c", "rbf"]).cases
-    return plan_trials(cases, n_trials, 0, n_episodes)
+    return plan_trials(cases, n_trials, root_seed=0, n_episodes=n_episodes)
 
 
 def test_teams_have_one_agent_each_and_shrink_as_jobs_increase():
-    plan = plan_of_small_agents(3, 40)
+    plan = plan_of_small_agents(n_trials=3, n_episodes=40)
     n_of_agent = 4 * 3  # trials: three in each of four cases
     teams = teams_of(plan, 2)
     assert {planned for team in teams for planned in team} == set(plan)
@@ -50,7 +50,7 @@ def test_teams_have_one_agent_each_and_shrink_as_jobs_increase():
 
 
 def test_trials_with_most_inputs_begin_first(tmp_path):
-    plan = plan_of_small_agents(2, 20)
+    plan = plan_of_small_agents(n_trials=2, n_episodes=20)
     begun = {}
 
     def observe(message):
@@ -60,17 +60,17 @@ def test_trials_with_most_inputs_begin_first(tmp_path):
     with ResultStore(tmp_path) as store:
         run_trials(plan, store, executor=ThreadExecutor(1), observer=observe)
     keys = [key for key in begun if key.agent == "sdnn-c"]
-    n_inputs = [int(key.case_id[1]) for key in keys]
+    n_inputs = [int(key.case_id[1]) for key in keys]  # the case "s4" has 4 inputs
     assert n_inputs == sorted(n_inputs, reverse=True)
 
 
 def test_trials_run_in_teams_have_the_rows_of_trials_run_alone(tmp_path):
-    plan = plan_of_small_agents(1, 60)
+    plan = plan_of_small_agents(n_trials=1, n_episodes=60)
     with ResultStore(tmp_path) as store:
         assert run_trials(plan, store, executor=ThreadExecutor(1)).n_run == len(plan)
         records = {record.key: record for record in store.load()}
     for planned in plan:
-        *_, (_, alone) = run_to_end(planned)
+        *_, (_, alone) = run_to_end(planned)  # its last message is Finished(planned, record)
         record = records[planned.key]
         assert record.rows.digest() == alone.rows.digest()
         assert record.n_decisions == alone.n_decisions
@@ -78,15 +78,16 @@ def test_trials_run_in_teams_have_the_rows_of_trials_run_alone(tmp_path):
 
 
 def test_a_trial_that_fails_in_a_team_does_not_affect_the_others(tmp_path, monkeypatch):
-    plan = plan_of_small_agents(1, 20)
+    plan = plan_of_small_agents(n_trials=1, n_episodes=20)
     spec = plan[0].spec
     kwargs = spec.environment.kwargs
     acrobot = kwargs["acrobot"] | {"goal_reward": 1e39, "penalty": 1e39}  # over a float's range
     environment = spec.environment.replace(kwargs=kwargs | {"acrobot": acrobot})
     bad = PlannedTrial(plan[0].key, spec.replace(environment=environment))
-    monkeypatch.setattr("sdnn.runs.engine.teams_of", lambda planned, jobs: [planned])
+    good = plan[3]
+    monkeypatch.setattr("sdnn.runs.engine.teams_of", lambda planned, jobs: [planned])  # one team
     with ResultStore(tmp_path) as store:
-        outcome = run_trials([bad, plan[3]], store, executor=ThreadExecutor(1))
+        outcome = run_trials([bad, good], store, executor=ThreadExecutor(1))
     assert outcome.n_run == 1
     assert [f.planned for f in outcome.failures] == [bad]
 
@@ -167,6 +168,8 @@ def test_ctrl_c_keeps_finished_trials_and_the_next_run_resumes(tmp_path, run):
     before = signal.getsignal(signal.SIGINT)
 
     class Interrupting(fake_trial.FakeTrial):
+        sent = False
+
         def __init__(self, *, seed, **parts):
             super().__init__(seed=seed, **parts)
             begun_seeds.append(seed)
@@ -179,8 +182,6 @@ def test_ctrl_c_keeps_finished_trials_and_the_next_run_resumes(tmp_path, run):
                 os.kill(os.getpid(), signal.SIGINT)
             else:
                 time.sleep(0.001)
-
-        sent = False
 
     outcome, _ = run(tmp_path, None, Interrupting, executor=ThreadExecutor(1))
     assert outcome.interrupted
@@ -213,7 +214,7 @@ def test_an_error_of_the_store_stops_the_run(tmp_path, use_trial):
 
 
 class Scripted:
-    """An executor that only reports: each part of its script makes a message of the plan."""
+    """Executor that runs nothing: functions of the planned trials make the messages it reports."""
 
     def __init__(self, *script):
         self.script = script
@@ -228,26 +229,10 @@ class Scripted:
 
 @pytest.fixture
 def record(tmp_path, run):
-    """The first trial's record, as another run gave it."""
+    """The record of the first trial of the plan `make_plan(1)`, from another folder."""
     run(tmp_path / "other", fake_trial.make_plan(1))
     with ResultStore(tmp_path / "other") as store:
         return store.load([fake_trial.make_plan(1)[0].key])[0]
-
-
-def noted(first, second):
-    return Noted("a note")
-
-
-def begun(first, second):
-    return Advanced(first, 0)
-
-
-def advanced(first, second):
-    return Advanced(first, 100)
-
-
-def failed(first, second):
-    return Failed(second, LOST)
 
 
 LOST = WorkerLostError("a lost worker")
@@ -256,11 +241,14 @@ LOST = WorkerLostError("a lost worker")
 @pytest.fixture
 def restarting(record):
     """An executor whose first trial starts again and finishes, and whose second trial fails."""
-
-    def finished(first, second):
-        return Finished(first, record)
-
-    return Scripted(noted, begun, advanced, begun, failed, finished)
+    return Scripted(
+        lambda first, second: Noted("a note"),
+        lambda first, second: Advanced(first, 0),
+        lambda first, second: Advanced(first, 100),
+        lambda first, second: Advanced(first, 0),  # episodes: it starts again
+        lambda first, second: Failed(second, LOST),
+        lambda first, second: Finished(first, record),
+    )
 
 
 def test_observers_receive_the_reports_of_an_executor_in_order(tmp_path, run, restarting):
@@ -298,7 +286,7 @@ def test_an_executor_is_closed_when_the_store_fails(tmp_path, run, record, monke
     monkeypatch.setattr(ResultStore, "add", full)
     with pytest.raises(StoreError, match="disk full"):
         run(tmp_path, fake_trial.make_plan(1), executor=executor)
-    assert executor.closed
+    assert executor.closed, "its generator has ended"
 
 
 def test_trials_that_end_together_are_stored_in_one_transaction(tmp_path, run, use_trial):

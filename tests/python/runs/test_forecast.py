@@ -47,13 +47,15 @@ def test_forecasts_use_stored_trials_or_else_one_probe(use_trial, study, tmp_pat
     for name in ("base", "discount=0.9"):
         assert by_variant[name]["seconds_of_a_trial"] == pytest.approx(probed)
         assert by_variant[name]["source"].startswith("the first ")
-    assert len(probed_seeds) == 2 + 1  # tried, but for one that is the same, and one probe
-    assert forecast["seconds"] == pytest.approx(3.0 + 2 * probed)
+    # The discount 0.9 is the base's: two configurations are tried, and one of them is probed.
+    assert len(probed_seeds) == 2 + 1
+    assert forecast["seconds"] == pytest.approx(3.0 + 2 * probed)  # of one trial of 0.8, two of 0.9
 
 
 def test_budgets_in_steps_and_in_episodes_have_separate_probes(study, tmp_path, monkeypatch):
     def probe(planned):
-        return 3.0 if planned.spec.budget.steps is None else 0.01, 5  # for an episode, a step
+        seconds = 3.0 if planned.spec.budget.steps is None else 0.01  # of an episode or a step
+        return seconds, 5  # the number of episodes that were run
 
     monkeypatch.setattr(sweep, "_probe", probe)
     mine = study("""
@@ -69,15 +71,16 @@ def test_budgets_in_steps_and_in_episodes_have_separate_probes(study, tmp_path, 
     protocol.evaluate_every = 10000
     """)
     forecast = sweep.forecast(mine, tmp_path / "out", 1)
-    assert [trial["seconds_of_a_trial"] for trial in forecast["trials"]] == [300.0, 200.0]
+    seconds = [trial["seconds_of_a_trial"] for trial in forecast["trials"]]
+    assert seconds == [100 * 3.0, 20_000 * 0.01]
 
 
 def test_forecasts_run_python_trials_one_at_a_time_and_compiled_ones_on_all_cores(monkeypatch):
     monkeypatch.setattr(sweep, "n_cores", lambda: 16)
-    compiled, locked = (8.0, True), (4.0, False)
+    compiled, locked = (8.0, True), (4.0, False)  # seconds of a trial, and whether it is compiled
     assert wall_seconds(4 * [compiled], 2) == 16.0
     assert wall_seconds(2 * [compiled], 4) == 8.0, "no trial is cut in parts"
-    assert wall_seconds([compiled, *4 * [locked]], 8) == 16.0
+    assert wall_seconds([compiled, *4 * [locked]], 8) == 4 * 4.0
     assert wall_seconds([], 2) == 0.0
     monkeypatch.setattr(sweep, "n_cores", lambda: 2)
     assert wall_seconds(4 * [compiled], 64) == 16.0, "no more at once than there are cores"

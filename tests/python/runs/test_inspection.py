@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import gymnasium as gym
@@ -15,7 +16,7 @@ MOST_BYTES = 2 * 10**6
 
 
 class DockEnv(gym.Env):
-    """Go to 0, by a gear; the colour means nothing."""
+    """Move a point to 0; the observed gear and colour are random and have no effect."""
 
     observation_space = gym.spaces.Dict(
         colour=gym.spaces.Discrete(3),
@@ -39,7 +40,7 @@ class DockEnv(gym.Env):
 
 
 class MaskedEnv(gym.Env):
-    """Each step costs 1; action 2, the only one without a cost, is masked. A sensor is stuck."""
+    """Each step costs 1; action 2 is always masked, and the second observation is constant."""
 
     observation_space = gym.spaces.Box(0.0, 1.0, (2,))
     action_space = gym.spaces.Discrete(3)
@@ -62,7 +63,7 @@ class MaskedEnv(gym.Env):
 gym.register("tests/Masked-v0", entry_point=MaskedEnv, max_episode_steps=20)
 gym.register("tests/Dock-v0", entry_point=DockEnv, max_episode_steps=50)
 
-TASKS = {
+TASKS = {  # the name and the type of one of the inputs
     "CartPole-v1": ("observation 0", "variable"),
     "Pendulum-v1": ("angle of observation 0 and 1", "angle"),
     "MountainCar-v0": ("observation 1", "variable"),
@@ -90,13 +91,12 @@ def test_the_page_is_small_and_self_contained(invoke, trained, task):
     before = (folder / "checkpoint.safetensors").read_bytes()
     result = invoke("inspect", folder, "--json")
     assert result.exit_code == 0, result.output
-    values = json.loads(result.stdout)
+    input_types = {i["name"]: i["type"] for i in json.loads(result.stdout)["inputs"]}
     name, input_type = TASKS[task]
-    assert {"name": name, "type": input_type}.items() <= next(
-        i for i in values["inputs"] if i["name"] == name
-    ).items()
+    assert input_types[name] == input_type
     page = (folder / "inspect.html").read_text()
     assert len(page) < MOST_BYTES
+    # Four figures, each with a variant for narrow screens; nothing is loaded from elsewhere.
     assert page.count("<img") == page.count("<source media=") == 4
     assert not re.search(r"""(?:src|href)\s*=\s*["'](?!data:)""", page)
     assert not re.search(r"<script|@import|url\((?!data:)", page)
@@ -149,9 +149,9 @@ def test_inputs_that_are_left_out_are_in_the_table_without_influence(trained):
     table = inspection.input_table()
     left_out = {i.input.name for i in inspection.influences if not i.input.is_used}
     assert "colour" in left_out
-    notes = {row[0]: row[-1] for row in table.rows}
+    notes = {name: note for name, *_, note in table.rows}
     assert all(notes[name].startswith("left out") for name in left_out)
-    assert inspection.influences[-1].on_values == 0.0
+    assert inspection.influences[-1].on_values == 0.0, "sorted: those without influence are last"
 
 
 def test_warnings_name_narrow_use_collapse_and_rounded_rewards(trained):
@@ -163,10 +163,10 @@ def test_warnings_name_narrow_use_collapse_and_rounded_rewards(trained):
         {"kind": "evaluation", "step": step, "mean_return": mean, "episode": step}
         for step, mean in ((1, 10.0), (2, 500.0), (3, 20.0))
     ]
-    fallen = type(inspection)(**{**vars(inspection), "rows": evaluations})
-    assert any("--keep-best" in text for text in fallen.warnings())
+    collapsed = replace(inspection, rows=evaluations)
+    assert any("--keep-best" in text for text in collapsed.warnings())
     coarse = {**inspection.report, "value_unit": 0.5, "recent_reward": 1.0}
-    rounded = type(inspection)(**{**vars(inspection), "report": coarse})
+    rounded = replace(inspection, report=coarse)
     assert any("rounded" in text for text in rounded.warnings())
 
 
@@ -177,6 +177,7 @@ def test_warnings_name_constant_inputs_and_maps_leave_out_masked_actions(trained
     assert "observation 1 is constant: the agent can do without it." in warnings
     assert not any("uses only" in text for text in warnings)
     assert not any("mask" in text for text in warnings)
+    # Of the actions 0, 1 and 2, the last is always masked.
     assert set(np.unique(inspection.state_map.actions)) <= {0.0, 1.0}
     assert set(np.unique(inspection.episode.actions)) <= {0.0, 1.0}
     assert "a mask allowed in the nearest state" in inspection.page().to_html("")

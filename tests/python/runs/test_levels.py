@@ -12,8 +12,9 @@ CARTPOLE = EnvironmentSpec(id="CartPole-v1")
 
 
 def test_goals_are_those_of_registrations_unless_arguments_change_the_environment():
-    assert goal_of(CARTPOLE) == gym.spec("CartPole-v1").reward_threshold == 475
-    assert goal_of(CARTPOLE.replace(noise=0.1, ranges={"all": (-1.0, 1.0)})) == 475
+    registered = gym.spec("CartPole-v1").reward_threshold
+    assert goal_of(CARTPOLE) == registered == 475
+    assert goal_of(CARTPOLE.replace(noise=0.1, ranges={"all": (-1.0, 1.0)})) == registered
     assert goal_of(CARTPOLE.replace(kwargs={"sutton_barto_reward": True})) is None
     assert goal_of(EnvironmentSpec(id="Pendulum-v1")) is None
     assert goal_of(EnvironmentSpec(id="a_module:Unknown-v0")) is None
@@ -37,7 +38,7 @@ def test_the_mean_return_of_random_actions_is_the_same_each_time():
 
 @pytest.fixture
 def foreign_environment():
-    """An environment that must not be stepped without being asked for."""
+    """A registered environment of a user, which raises an error when it is made."""
 
     def make(**kwargs):
         raise AssertionError

@@ -14,11 +14,12 @@ from sdnn.runs.results import MEASURES, episode_of_collapse, episodes_to_learn, 
 
 
 def episodes(steps):
+    """Return the episodes of the evaluations, 10, 20, ..., that took these numbers of steps."""
     return 10 * np.arange(1, len(steps) + 1)
 
 
 def measure(name, steps, returns=None):
-    """A measure of a trial that took these numbers of steps in tests every 10 episodes."""
+    """Return a measure of a trial whose evaluations took these numbers of steps."""
     steps = np.asarray(steps)
     returns = np.zeros(steps.size) if returns is None else np.asarray(returns)
     rows = TrialRows.of_tests(episodes(steps), steps, returns, steps < 50)
@@ -62,6 +63,7 @@ def test_final_measures_use_the_last_50_evaluations():
         pytest.param([50] * 100 + [7] * 50, math.inf, id="none after late mastery"),
         pytest.param([7] * 50, math.inf, id="none within the trial"),
         pytest.param([7] * 60 + [50] * 100 + [7] * 60, math.inf, id="a relapse is no collapse"),
+        # The same 160 tests or 1,600 episodes later.
         pytest.param([7] * 60 + [50] * 100 + [7] * 60 + [50] * 100, 2440.0, id="after a relapse"),
         pytest.param([50] * 200, 0.0, id="never mastered"),
         pytest.param([7, 50] * 100, 0.0, id="never mastered for a run"),
@@ -95,6 +97,6 @@ def test_mean_and_final_returns_average_all_or_the_last_tenth():
         return [measure(name, steps, returns) for name in ("mean_return", "final_return")]
 
     returns = np.arange(40.0)
-    assert mean_and_final(returns) == [19.5, 37.5]  # 36 to 39
+    assert mean_and_final(returns) == [19.5, 37.5]  # the means of 0 to 39 and of 36 to 39
     assert mean_and_final(returns[:19])[1] == 18.0  # a tenth of 19 is the last one
     assert mean_and_final([-3.0]) == [-3.0, -3.0]

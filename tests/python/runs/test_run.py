@@ -46,7 +46,7 @@ WARMING_UP = run_spec(CONFIG, environment=EnvironmentSpec(id="tests/Drifting-v0"
 
 
 def contents(run):
-    """All of a run that must not depend on kills."""
+    """Return the files and rows of a run that must not depend on interruptions."""
     names = ("checkpoint.safetensors", "agent.safetensors")
     files = {name: (run.folder / name).read_bytes() for name in names}
     return files | {"rows": run.rows()}
@@ -54,7 +54,7 @@ def contents(run):
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """Runs that nothing interrupted, by their configurations."""
+    """Return the uninterrupted run of a configuration, which is trained at its first use."""
     folder = tmp_path_factory.mktemp("whole")
     done = []
 
@@ -75,8 +75,8 @@ def test_a_run_is_created_over_the_partial_file_of_a_killed_one(tmp_path):
     assert Run.create(tmp_path, CONFIG).folder == tmp_path
     assert not left.exists()
     (tmp_path / "other").mkdir()
-    with open(tmp_path / "other" / left.name, "wb") as file:  # of a process that is not killed
-        assert lock(file.fileno())
+    with open(tmp_path / "other" / left.name, "wb") as file:
+        assert lock(file.fileno()), "as of a process that still writes"
         refuses("other", Run.create, tmp_path / "other", CONFIG, error=RunError)
 
 
@@ -103,11 +103,11 @@ def test_a_run_equals_the_training_of_its_configuration(whole, tmp_path):
     }  # fmt: skip
 
 
-SEVERAL = run_spec(WARMING_UP, n_envs=3)
+THREE_ENVIRONMENTS = run_spec(WARMING_UP, n_envs=3)
 
 
 @pytest.mark.parametrize(
-    "config", [CONFIG, WARMING_UP, SEVERAL], ids=["noise", "warm-up", "several"]
+    "config", [CONFIG, WARMING_UP, THREE_ENVIRONMENTS], ids=["noise", "warm-up", "3 environments"]
 )
 def test_a_run_stopped_at_any_step_resumes_exactly(whole, tmp_path, config):
     expected = contents(whole(config))
@@ -121,7 +121,7 @@ def test_a_run_stopped_at_any_step_resumes_exactly(whole, tmp_path, config):
 
 
 class FailAt(Callback):
-    """An error in the midst of a step, when rows are written and learning is done."""
+    """Raise an error at a step, after the agent has learned and before a checkpoint."""
 
     def __init__(self, step):
         self._step = step
@@ -177,14 +177,14 @@ def test_a_new_goal_is_kept_when_the_run_is_stopped_again(tmp_path):
     run.train()
     run.train(steps=120, callbacks=[Stop(80)])
     assert Run.open(run.folder).train().n_steps == 120
-    refuses("120", run.train, steps=20, error=ConfigError)
+    refuses("120", run.train, steps=20, error=ConfigError)  # fewer than the 120 that are done
     refuses("episodes", run.train, steps=200, episodes=20, error=ConfigError)
     assert run.train(episodes=20).n_episodes == 20
 
 
 def test_a_run_may_end_before_its_first_checkpoint(tmp_path):
     run = Run.create(tmp_path / "run", CONFIG)
-    assert run.train(steps=30).n_steps == 30
+    assert run.train(steps=30).n_steps == 30 < CONFIG.output.checkpoint_every
 
 
 def test_a_run_makes_training_and_evaluation_environment_once(tmp_path, monkeypatch):
@@ -241,6 +241,7 @@ def test_the_time_of_a_run_is_the_sum_over_its_parts(tmp_path):
         parts.append(time.thread_time() - before)
     with ResultStore(run.folder, read_only=True) as store:
         (record,) = store.load()
+    # The stored time omits that of starting each part.
     assert max(parts) < record.seconds < sum(parts)
 
 

@@ -37,7 +37,7 @@ def test_the_description_of_the_scaling_reproduces_observations(redundant):
     low, high = environment.scaling().ends
     lines = list(environment.scaling().lines())
     for seed in range(5):
-        known = {}
+        known = {}  # the scaled observation, computed from the lines only
         values, _ = bare.reset(seed=seed)
         for line in lines:
             name, variable, first, last, left, right = re.fullmatch(
@@ -46,13 +46,13 @@ def test_the_description_of_the_scaling_reproduces_observations(redundant):
             if variable is None:
                 known[name] = (known[left] + known[right]) / 2
             else:
-                part = (values[int(variable)] - float(first)) / (float(last) - float(first))
-                known[name] = min(max(part, 0.0), 1.0)
+                unit = (values[int(variable)] - float(first)) / (float(last) - float(first))
+                known[name] = min(max(unit, 0.0), 1.0)
         observation, _ = scaled.reset(seed=seed)
         assert list(known) == [f"observation[{i}]" for i in range(2 + redundant)]
         np.testing.assert_allclose(observation, list(known.values()), rtol=1e-15)
-        unit, _ = UnitSensors(bare, low, high).reset(seed=seed)
-        assert np.array_equal(observation[:2], unit)
+        without_redundant, _ = UnitSensors(bare, low, high).reset(seed=seed)
+        assert np.array_equal(observation[:2], without_redundant)
 
 
 def test_without_noise_and_redundancy_there_is_no_scaling():
@@ -67,7 +67,7 @@ def test_noise_is_a_share_of_the_range_and_reproducible_by_seed():
     env = environment.make()
     assert isinstance(env, NoisySensors)
 
-    def errors(env, seed):
+    def errors(env, seed):  # shape (40, 3): steps, two variables and their mean
         differences = []
         observation, _ = env.reset(seed=seed)
         for _ in range(40):
@@ -78,7 +78,7 @@ def test_noise_is_a_share_of_the_range_and_reproducible_by_seed():
 
     first = errors(env, 3)
     assert first.std() == pytest.approx(0.02, rel=0.2)
-    assert np.array_equal(errors(env, 3), first)  # whatever was drawn before
+    assert np.array_equal(errors(env, 3), first), "the noise depends on the seed only"
     assert not np.array_equal(errors(env, 4), first)
     assert not np.array_equal(errors(environment.make("evaluation_sensor_noise"), 3), first)
 
@@ -86,6 +86,7 @@ def test_noise_is_a_share_of_the_range_and_reproducible_by_seed():
 def test_discrete_observations_are_flattened_to_one_hot_vectors():
     env = EnvironmentSpec(id="FrozenLake-v1", redundant=1).make()
     observation, _ = env.reset(seed=0)
+    # The first of 16 cells, and as redundant variable the mean of the first two.
     assert observation.tolist() == [1.0, *[0.0] * 15, 0.5]
 
 

@@ -86,7 +86,7 @@ def test_the_papers_acrobot_has_the_papers_defaults():
     assert (spec.agent.angle_pairs, spec.agent.inputs) == ("none", "all")
     assert spec.approximator == SDNNCConfig()
     general = paper_spec(agent="q-lambda-general")
-    assert general.make_agent(general.make_env()).approximator.n_inputs == 4
+    assert general.make_agent(general.make_env()).approximator.n_inputs == 4  # all of the task
 
 
 def test_the_hash_ignores_seed_and_output_but_no_other_settings():
@@ -95,8 +95,8 @@ def test_the_hash_ignores_seed_and_output_but_no_other_settings():
     assert spec.replace(output=OutputSpec(tensorboard=True)).config_hash == spec.config_hash
     assert FULL.config_hash != spec.config_hash
     robust = paper_spec(agent="sdnn-c-robust")
-    typed = paper_spec(approximator={"n_actions": 61}, learning={"n_steps": 5})
-    assert robust.config_hash == typed.config_hash
+    same_settings = paper_spec(approximator={"n_actions": 61}, learning={"n_steps": 5})
+    assert robust.config_hash == same_settings.config_hash
     assert paper_spec(learning={"discount": 1}) == paper_spec(learning={"discount": 1.0})
 
 
@@ -175,13 +175,14 @@ def test_with_own_units_angle_pairs_can_be_declared_despite_noise():
     spec = RunSpec(environment=environment, agent=AgentSpec(name="rbf", angle_pairs=((0, 1),)))
     assert RunSpec.from_values(spec.values()) == spec
     env = spec.make_env()
+    # Cosine, sine and speed of the pendulum, and the mean of the first two.
     np.testing.assert_array_equal(env.observation_space.low, [-1, -1, -8, -1])
     np.testing.assert_array_equal(env.observation_space.high, [1, 1, 8, 1])
     agent = spec.make_agent(env)
     assert agent.scaling is None
     assert agent.approximator.n_inputs == 3  # an angle, its speed, and the redundant one
     with pytest.raises(ConfigError) as caught:
-        AgentSpec(angle_pairs=((0, 1, 2),))
+        AgentSpec(angle_pairs=((0, 1, 2),))  # no pair
     assert caught.value.key.startswith("angle_pairs")
 
 
@@ -193,7 +194,7 @@ def test_the_setting_inputs_reaches_agent_and_hash_and_unknown_inputs_are_refuse
     assert RunSpec.from_values(json.loads(json.dumps(spec.values()))) == spec
     env = spec.make_env()
     agent = spec.make_agent(env)
-    assert agent.is_warming_up  # it looks for relevant inputs
+    assert agent.is_warming_up, "it has inputs to choose or scale"
     with_all = spec.replace(agent=spec.agent.replace(inputs="all"))
     assert with_all.config_hash != spec.config_hash
     by_default = spec.replace(agent=AgentSpec(name="sdnn-c", warm_up_steps=50))
@@ -271,7 +272,7 @@ def test_a_warm_up_does_not_narrow_fixed_ranges(noise):
     agent.train(env, steps=spec.agent.warm_up_steps)
     assert not agent.is_warming_up
     low, high = agent.observation_range
-    expected = (0.0, 1.0) if noise else (-100.0, 100.0)
+    expected = (0.0, 1.0) if noise else (-100.0, 100.0)  # noise is added to scaled observations
     assert set(zip(low, high, strict=True)) == {expected}
 
 
@@ -293,7 +294,7 @@ def test_make_agent_returns_the_class_with_its_settings():
     spec = RunSpec(environment=pendulum, agent=AgentSpec(name="fuzzy"))
     fuzzy = spec.make_agent(pendulum.make())
     assert type(fuzzy) is FuzzyQLearning
-    assert fuzzy.n_rules == 9**3
+    assert fuzzy.n_rules == 9**3  # all combinations of 9 fuzzy sets of 3 observations
 
 
 @pytest.mark.parametrize(

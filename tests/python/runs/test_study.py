@@ -1,6 +1,5 @@
 """Study files: the configurations and trials that they plan, and errors in files."""
 
-import re
 import sys
 from pathlib import Path
 
@@ -19,6 +18,7 @@ seed = 3
 
 
 def configs(study):
+    """Return the specifications of a study, by their pairs (case, variant)."""
     return {pair: combination.spec for pair, combination in study.combinations.items()}
 
 
@@ -29,8 +29,8 @@ def test_a_study_without_variants_plans_the_trials_of_the_paper(study):
         (case_id, "base"): case_spec(cases[case_id], "sdnn-c")
         for case_id in ("s4", "s4-noise", "s6")
     }
-    paper = {p.key for p in plan_trials(cases.values(), 2, 3)}
-    assert {p.key for p in loaded.plan()} < paper
+    paper = {p.key for p in plan_trials(cases.values(), n_trials=2, root_seed=3)}
+    assert {p.key for p in loaded.plan()} < paper, "without the paper's other cases and agents"
     assert loaded.title == "mine"
     assert loaded.reference == "base"
 
@@ -43,7 +43,7 @@ def test_trial_0_of_every_case_and_variant_is_planned_before_trial_1(study):
     assert [p.key.case_id for p in plan[:9]] == 3 * ["s4"] + 3 * ["s4-noise"] + 3 * ["s6"]
     seeds = {(p.key.case_id, p.key.trial): p.key.seed for p in plan}
     assert all(p.key.seed == seeds[p.key.case_id, p.key.trial] for p in plan)
-    assert len(set(seeds.values())) == 6
+    assert len(set(seeds.values())) == 3 * 2, "a seed for each trial of a case"
 
 
 def test_settings_of_variants_override_cases_agents_and_base(study):
@@ -76,6 +76,7 @@ def test_settings_of_variants_override_cases_agents_and_base(study):
         agent = "rbf"
         """
     )
+    # Each overrides those before: base, agents, cases, variants, cases of a variant.
     values = {
         pair: (c.learning.discount, c.learning.learning_rate, c.learning.n_greedy_steps)
         for pair, c in configs(loaded).items()
@@ -210,7 +211,7 @@ def test_a_study_may_mix_the_papers_acrobot_with_other_environments(study):
     assert configs(loaded)["s4", "base"].environment.is_paper_acrobot
     cart = configs(loaded)["cart", "base"]
     assert cart.environment.ranges == {"1": (-4.0, 4.0), "3": (-4.0, 4.0)}
-    loaded.check()
+    loaded.check()  # raises an error if an agent or environment cannot be made
 
 
 def test_options_override_the_number_of_trials_and_the_seed_of_the_file(study):
@@ -223,7 +224,7 @@ def test_only_selects_variants_and_refuses_unknown_ones(study):
     text = PAPER + "[axes]\nlearning.discount = [0.5, 0.7]\n"
     loaded = study(text, only=["discount=0.5"])
     assert {p.spec.learning.discount for p in loaded.plan()} == {0.5}
-    assert len(loaded.combinations) == 9
+    assert len(loaded.combinations) == 3 * 3, "those of all cases and variants"
     with pytest.raises(ValueError, match=r"discount=0\.6.*discount=0\.[57]"):
         study(text, only=["discount=0.6"])
 
@@ -234,7 +235,7 @@ def test_a_variant_with_only_runs_in_the_listed_cases(study):
     assert set(configs(loaded)) == {("s4", "a"), ("s4-noise", "a"), ("s6", "a"), ("s6", "b")}
     assert len(loaded.plan()) == 8  # two trials of four pairs
     assert {p.key.case_id for p in study(text, only=["b"]).plan()} == {"s6"}
-    assert loaded.copies() == {}
+    assert loaded.copies() == {}, "no variant equals another one"
 
 
 PLUGIN = """
@@ -304,13 +305,16 @@ def test_errors_of_registered_configurations_name_file_and_line(study, tmp_path,
 def wrong_studies(name):
     """Yield texts of studies, the line that is wrong (0 if no line is), and the message about it.
 
-    A file of them has a title before each study, and the message after ``#!``.
+    In the file, a title such as "=== title" precedes each study; "#! message" follows the title or
+    the line that is wrong.
     """
     text = Path(__file__, "../../reference/wrong_studies", name).resolve().read_text()
-    for title, study in re.findall(r"^=== (.*)\n((?:(?!===).*\n)+)", text, re.MULTILINE):
-        lines = [title, *study.splitlines()]
-        ((number, line),) = [(n, line) for n, line in enumerate(lines) if "#! " in line]
-        yield pytest.param(study, number, line.partition("#! ")[2], id=title.partition("  #!")[0])
+    for part in text.split("=== ")[1:]:
+        title, _, study = part.partition("\n")
+        lines = part.splitlines()  # the title has the number 0
+        (number,) = (n for n, line in enumerate(lines) if "#! " in line)
+        message = lines[number].partition("#! ")[2]
+        yield pytest.param(study, number, message, id=title.partition("  #!")[0])
 
 
 PRODUCT = "[cases.s4]\n[axes]\ncombine = 'product'\n" + "".join(
@@ -324,19 +328,16 @@ PRODUCT = "[cases.s4]\n[axes]\ncombine = 'product'\n" + "".join(
     [
         *wrong_studies("wrong.txt"),
         (PRODUCT, 3, "axes.combine: must give at most 5000 combinations"),
-        (
-            "[base]\nenvironment.kwargs.a = " + 99 * "[" + 99 * "]",
-            0,
-            "base.environment",
-        ),  # too deep: without a line
+        # Values and keys that are nested too deeply have no line.
+        ("[base]\nenvironment.kwargs.a = " + 99 * "[" + 99 * "]", 0, "base.environment"),
         ("[base]\n" + 99 * "a." + "a = 1", 0, "must be TOML: a key must have"),
     ],
 )
 def test_errors_in_a_study_file_name_file_line_and_key(study, tmp_path, text, line, message):
     with pytest.raises(ConfigError) as caught:
         study(text)
-    place = f"{tmp_path / 'mine.toml'}:{line or ''}".rstrip(":")  # line 0: the file only
-    assert str(caught.value).startswith(f"{place}: {message}")
+    location = f"{tmp_path / 'mine.toml'}:{line or ''}".rstrip(":")  # line 0: the file only
+    assert str(caught.value).startswith(f"{location}: {message}")
 
 
 @pytest.mark.parametrize(("text", "line", "message"), [*wrong_studies("unusable.txt")])
@@ -347,8 +348,8 @@ def test_check_raises_errors_of_the_core_with_file_and_line(study, tmp_path, tex
 
 
 def test_check_skips_trials_that_are_stored(study, monkeypatch):
-    text = "[cases.s4]\n[variants.a]\nenvironment.kwargs.acrobot.integration_step = 0.3\n"
-    loaded = study(text, n_trials=2)
+    impossible = "environment.kwargs.acrobot.integration_step = 0.3\n"
+    loaded = study("[cases.s4]\n[variants.a]\n" + impossible, n_trials=2)
     loaded.check(stored=loaded.keys("s4", "a"))
     with pytest.raises(ConfigError):
         loaded.check(stored=loaded.keys("s4", "a")[:1])

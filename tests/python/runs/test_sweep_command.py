@@ -41,9 +41,9 @@ def test_a_sweep_writes_its_files_and_resumes(invoke, tmp_path):
     names = sorted(p.name for p in (tmp_path / "out").iterdir())
     assert names == sorted([*(f"mine-{name}" for name in [*FILES, "trials.csv"]), "results.sqlite"])
     # Two trials of two cases with the base and the discount 0.8; the discount 0.9 is the base's.
-    # Trials in the file, planned, run now; and written files.
+    # Printed: trials that are stored, planned (8 each) and were run now, and the 7 written files.
     assert re.match(r"8 of 8 .* out \(8 .* 7 ", result.stdout.splitlines()[-1])
-    assert "not judged" in result.stdout
+    assert "not judged" in result.stdout, "the study has no claims"
     again = invoke("sweep", "mine.toml", "--out", "out")
     assert re.search(r"\b8 of 8 .* out \(0 ", again.stdout)
     more = invoke("sweep", "mine.toml", "--out", "out", "--trials", 3)
@@ -73,7 +73,7 @@ def test_sweep_and_reproduce_share_stored_trials(invoke):
     # The 4 of 8 trials with the base's discount are stored.
     assert re.search(r"\b8 of 8 .* results \(4 ", result.stdout)
     again = invoke("reproduce", "a", "--trials", 2, "--episodes", 300)
-    assert "(0 " in again.stdout
+    assert "(0 " in again.stdout, "none are run again"
 
 
 def test_the_json_output_is_the_written_table_for_any_number_of_jobs(invoke, tmp_path):
@@ -103,9 +103,9 @@ def test_only_runs_the_selected_variants(invoke):
     result = invoke("sweep", "mine.toml", "--only", "discount=0.8", "--only", "discount=0.8")
     assert re.search(r"\b4 of 4 .* results \(4 ", result.stdout), "two trials of two cases"
     assert " 4 of 6 " in result.stdout, "combinations of a variant and a case"
-    rest = invoke("sweep", "mine.toml", "--only", "base")
-    assert "(4 " in rest.stdout
-    assert " of 6 " not in rest.stdout
+    completing = invoke("sweep", "mine.toml", "--only", "base")
+    assert "(4 " in completing.stdout, "trials that were missing"
+    assert " of 6 " not in completing.stdout, "no combination is incomplete"
     wrong = invoke("sweep", "mine.toml", "--only", "discount=0.7")
     assert wrong.exit_code == 2
     assert re.search("discount=0.7.*discount=0.9, discount=0.8, base", wrong.stderr)

@@ -33,11 +33,12 @@ COLUMNS = ("episode", "steps", "episode_return", "solved")
 
 
 def columns(trial):
+    """Return the rows of a trial in Python in the form of the compiled trial's `test_rows`."""
     return {name: getattr(trial.rows(), name) for name in COLUMNS}
 
 
 def python_trial(spec, monkeypatch):
-    """Make the trial that the agent has where it has none in C++."""
+    """Make a trial in Python, which also runs the agents that have no compiled trial."""
     entry = replace(AGENTS[spec.agent.name], core_trial=None)
     monkeypatch.setitem(AGENTS, spec.agent.name, entry)
     trial = spec.make_trial(SEED)
@@ -65,7 +66,7 @@ def test_a_trial_in_python_has_the_bits_of_the_compiled_trial(agent, n_sensors, 
     assert type(core).__module__ == _core.__name__
     core.advance(60)
     trial = python_trial(spec, monkeypatch)
-    for n_episodes in (0, 7, 1, 100):
+    for n_episodes in (0, 7, 1, 100):  # more than the 60 of its budget
         trial.advance(n_episodes)
     assert trial.finished
     assert core.finished
@@ -98,15 +99,13 @@ def test_a_trial_in_python_uses_all_settings_of_task_and_protocol(monkeypatch):
     np.testing.assert_array_equal(
         columns(trial)["episode_return"], core.test_rows()["episode_return"]
     )
-    assert columns(trial)["steps"].max() == 3
+    assert columns(trial)["steps"].max() == 3, "max_decisions"
 
 
 def test_a_trial_has_no_rows_before_its_first_evaluation(monkeypatch):
     trial = python_trial(spec_of("fuzzy"), monkeypatch)
-    trial.advance(4)
-    assert {name: column.size for name, column in columns(trial).items()} == {
-        "episode": 0, "steps": 0, "episode_return": 0, "solved": 0,
-    }  # fmt: skip
+    trial.advance(4)  # an evaluation comes every 5 episodes
+    assert [column.size for column in columns(trial).values()] == [0] * len(COLUMNS)
 
 
 def test_a_negative_number_of_episodes_is_refused(monkeypatch):
@@ -116,24 +115,25 @@ def test_a_negative_number_of_episodes_is_refused(monkeypatch):
 
 
 @dataclass(frozen=True)
-class Nothing:
+class NoSettings:
     n_inputs: int = 4
 
 
 def entry_of(agent_id):
-    return AgentEntry(id=agent_id, title="", approximator=Nothing, learning=Nothing, agent=object)
+    settings = {"approximator": NoSettings, "learning": NoSettings}
+    return AgentEntry(id=agent_id, title="", agent=object, **settings)
 
 
 def test_computing_action_values_does_not_change_the_rows_of_a_trial():
     n_torques = 601  # of the paper
-    asked, alone = (spec_of("sdnn-c", noise=0.02).make_trial(SEED) for _ in range(2))
+    queried, undisturbed = (spec_of("sdnn-c", noise=0.02).make_trial(SEED) for _ in range(2))
     for _ in range(60):
-        asked.advance(1)
-        values = asked.agent.networks[0].values([0.5, 0.5, 0.5, 0.5])
+        queried.advance(1)
+        values = queried.agent.networks[0].values([0.5, 0.5, 0.5, 0.5])
         assert values.shape == (n_torques,)
-    alone.advance(60)
-    for name, column in alone.test_rows().items():
-        np.testing.assert_array_equal(asked.test_rows()[name], column)
+    undisturbed.advance(60)
+    for name, column in undisturbed.test_rows().items():
+        np.testing.assert_array_equal(queried.test_rows()[name], column)
 
 
 def test_duplicate_and_invalid_ids_are_not_registered():
@@ -163,8 +163,8 @@ def test_the_entry_of_a_preset_is_its_agents_and_unknown_agents_are_refused():
 def test_a_registered_dataclass_configures_its_agent_by_default_and_is_hashed(monkeypatch):
     monkeypatch.setitem(AGENTS, "new", entry_of("new"))
     spec = spec_of("new", 5)
-    assert spec.approximator == Nothing()
-    assert '"name":"new"' in spec.canonical_json()
+    assert spec.approximator == NoSettings()
+    assert '"name":"new"' in spec.canonical_json(), "the text that is hashed"
     assert len(spec.config_hash) == 16
 
 
@@ -172,7 +172,7 @@ CAR = EnvironmentSpec(id="MountainCar-v0", kwargs={"max_episode_steps": 30}, noi
 
 
 def finished_trial(protocol, budget):
-    """Run a trial of a Gymnasium environment to its end, which may be early."""
+    """Run a trial of MountainCar with episodes of 30 steps to its end, which may be early."""
     trial = RunSpec(environment=CAR, protocol=protocol, budget=budget).make_trial(SEED)
     for _ in trial.training.pieces(0.0):
         pass
@@ -183,7 +183,7 @@ def finished_trial(protocol, budget):
 @pytest.mark.parametrize(
     ("protocol", "budget", "episodes"),
     [
-        # After 40 and 80 steps, of which 30 and 60 belong to finished episodes.
+        # Evaluated after 40 and 80 steps: one and two episodes of 30 steps are finished then.
         (ProtocolSpec(evaluate_every=40, evaluation_episodes=3), BudgetSpec(steps=90), [1, 2]),
         (ProtocolSpec(evaluate_every_episodes=2), BudgetSpec(episodes=4), [2, 4]),
         (ProtocolSpec(evaluate_every=0, n_envs=2), BudgetSpec(steps=90), []),

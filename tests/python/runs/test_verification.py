@@ -4,7 +4,6 @@ import json
 import shutil
 import signal
 import socket
-import sqlite3
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +11,7 @@ from pathlib import Path
 import gymnasium as gym
 import pytest
 
+from made_records import execute
 from refusals import refuses
 from sdnn.reproduction import plan_trials
 from sdnn.reproduction.cases import PAPER_CASES
@@ -33,9 +33,10 @@ SMALL = (
 
 @pytest.fixture(scope="module")
 def real_records(tmp_path_factory):
-    """Two short trials in C++ of each agent of the case s4."""
+    """Two short trials in C++ of each of the two agents of the case s4."""
+    plan = plan_trials([PAPER_CASES["s4"]], n_trials=2, root_seed=0, n_episodes=30)
     with ResultStore(tmp_path_factory.mktemp("real")) as store:
-        run_trials(plan_trials([PAPER_CASES["s4"]], 2, 0, 30), store)
+        run_trials(plan, store)
         return store.load()
 
 
@@ -54,7 +55,8 @@ def stored(folder, records):
     return folder
 
 
-def with_rows(record, column, row, value):
+def with_value(record, column, row, value):
+    """Return the record with another value in a row; its checksum fits, as it is made of rows."""
     table = record.rows.table.copy()
     table[column][row] = value
     return replace(record, rows=TrialRows(table))
@@ -74,6 +76,7 @@ def verify_folder(folder, consent=None, **options):
 
 
 def only_difference(verification):
+    """Return the trial that differs, which must be the only one."""
     (difference,) = verification.differences
     assert not verification.is_equal
     return difference
@@ -102,11 +105,9 @@ def test_trials_are_drawn_evenly_over_cases_and_the_same_by_a_seed(fake_store):
 
 @pytest.mark.parametrize("n_trials", [None, 1])
 def test_a_changed_byte_of_a_row_is_found_in_any_trial(fake_store, n_trials):
-    path = fake_store / "results.sqlite"
-    with sqlite3.connect(path) as connection:
-        # Rows of a trial have the numbers 0 to 29.
-        connection.execute("UPDATE rows SET length = 49 WHERE run_id = 3 AND number = 4")
-    connection.close()
+    # Rows of a trial have the numbers 0 to 29.
+    change = "UPDATE rows SET length = 49 WHERE run_id = 3 AND number = 4"
+    execute(fake_store / "results.sqlite", change)
     for seed in range(4):  # whether or not the trial is drawn
         verification = verify_folder(fake_store, n_trials=n_trials, seed=seed)
         difference = only_difference(verification)
@@ -118,7 +119,7 @@ def test_a_changed_byte_of_a_row_is_found_in_any_trial(fake_store, n_trials):
 
 def test_a_changed_row_with_a_right_checksum_is_found_by_running_the_trial(tmp_path, real_records):
     row = real_records[1].rows.table[2]
-    changed = with_rows(real_records[1], "return", 2, row["return"] + 1e-9)
+    changed = with_value(real_records[1], "return", 2, row["return"] + 1e-9)
     stored(tmp_path / "out", [real_records[0], changed, *real_records[2:]])
     verification = verify_folder(tmp_path / "out")
     difference = only_difference(verification)
@@ -149,11 +150,10 @@ def test_a_changed_setting_gives_other_rows(tmp_path, real_records):
 
 
 def test_a_setting_that_does_not_fit_its_hash_is_found(tmp_path, real_records):
-    path = stored(tmp_path / "out", real_records) / "results.sqlite"
-    with sqlite3.connect(path) as connection:
-        connection.execute("UPDATE runs SET config = replace(config, '0.9', '0.8') WHERE id = 2")
-    connection.close()
-    error = refuses("runs", verify_folder, path.parent, error=StoreError)
+    folder = stored(tmp_path / "out", real_records)
+    change = "UPDATE runs SET config = replace(config, '0.9', '0.8') WHERE id = 2"
+    execute(folder / "results.sqlite", change)
+    error = refuses("runs", verify_folder, folder, error=StoreError)
     assert "id 2" in str(error)
 
 
@@ -189,17 +189,16 @@ def test_unknown_agents_are_named(tmp_path, real_records):
 
 
 def test_rows_of_a_paper_case_with_another_configuration_are_named(tmp_path, invoke, real_records):
-    def quieter(values):
-        values["environment"]["kwargs"]["sensors"]["n_sensors"] = 6
-
-    foreign = with_config(real_records[0], quieter)
+    foreign = with_config(
+        real_records[0], lambda v: v["environment"]["kwargs"]["sensors"].update(n_sensors=6)
+    )
     trial = ReportedTrial.of_record(foreign)
     name = "environment.kwargs.sensors.n_sensors"
-    assert differences_from_paper(trial) == {name: ("6", "4")}
+    assert differences_from_paper(trial) == {name: ("6", "4")}  # here, and in the paper
     assert differences_from_paper(ReportedTrial.of_record(real_records[0])) == {}
+    plan = plan_trials([PAPER_CASES["s6"]], n_trials=1, root_seed=0, n_episodes=30)
     with ResultStore(tmp_path / "mine") as store:
-        planned = [p for p in plan_trials([PAPER_CASES["s6"]], 1, 0, 30) if p.key.agent == "sdnn-c"]
-        run_trials(planned, store)
+        run_trials([planned for planned in plan if planned.key.agent == "sdnn-c"], store)
         (record,) = store.load()
     renamed = replace(record, key=record.key._replace(case_id="s4"))
     result = invoke("verify", stored(tmp_path / "renamed", [renamed]))
@@ -217,7 +216,7 @@ gym.register("mine/Env-v0", entry_point=DriftingEnv, max_episode_steps=40)
 
 @pytest.fixture
 def own_module(tmp_path, monkeypatch):
-    """A module in the present folder that leaves a file when it is imported."""
+    """Write my_envs.py, a module that leaves a file when it is imported; return the file's path."""
     monkeypatch.setattr(sys, "path", [*sys.path])
     (tmp_path / "my_envs.py").write_text(MARKED)
     yield tmp_path / "my_envs.imported"
@@ -347,7 +346,7 @@ def test_unfinished_runs_are_left_out(tmp_path, real_records):
     with ResultStore(tmp_path / "out") as store:
         metadata = {"config": record.config, "version": record.version}
         store.extend(record.key, TrialRows(rows.table[:1]), 0, **metadata)
-    error = refuses("1", verify_folder, tmp_path / "out", error=RunError)
+    error = refuses("1", verify_folder, tmp_path / "out", error=RunError)  # the number of them
     assert "unfinished" in str(error)
     stored(tmp_path / "out", real_records[1:])
     verification = verify_folder(tmp_path / "out")
@@ -355,7 +354,7 @@ def test_unfinished_runs_are_left_out(tmp_path, real_records):
 
 
 class OneByOne(ThreadExecutor):
-    """Begins a trial when the one before it was observed: how many ended is no matter of luck."""
+    """Executor that begins a trial after the one before was observed, so that counts are fixed."""
 
     def run(self, planned, stop):
         for trial in planned:
@@ -399,7 +398,7 @@ def test_a_certificate_can_be_verified_and_names_no_computer(certificate):
 def test_a_changed_digest_of_a_certificate_is_shown_beside_that_here(certificate):
     values, path = certificate
     digest = values["trials"][2]["digest"]
-    values["trials"][2]["digest"] = f"{int(digest[0], 16) ^ 1:x}{digest[1:]}"
+    values["trials"][2]["digest"] = f"{int(digest[0], 16) ^ 1:x}{digest[1:]}"  # one bit flipped
     values |= {"instruction_set": "elsewhere"}
     path.write_text(json.dumps(values))
     difference = only_difference(verify(CertifiedReports(path)))
@@ -438,7 +437,7 @@ def test_files_that_are_no_certificates_are_refused(tmp_path, content):
 
 
 def test_no_certificate_is_written_of_trials_that_differ(invoke, tmp_path, real_records):
-    changed = with_rows(real_records[0], "length", 0, 7)
+    changed = with_value(real_records[0], "length", 0, 7)
     folder = stored(tmp_path / "out", [changed])
     result = invoke("verify", folder, "--certificate", "made.json")
     assert result.exit_code == 1
@@ -463,6 +462,5 @@ def test_verifying_leaves_a_run_as_it_is(invoke, tmp_path):
     assert invoke("verify", "run").exit_code == 0
     names = sorted(path.name for path in folder.iterdir())
     assert names == sorted(path.name for path in (tmp_path / "before").iterdir())
-    assert all(
-        (folder / name).read_bytes() == (tmp_path / "before" / name).read_bytes() for name in names
-    )
+    for name in names:
+        assert (folder / name).read_bytes() == (tmp_path / "before" / name).read_bytes()
