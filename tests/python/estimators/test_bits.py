@@ -13,16 +13,16 @@ pytestmark = pytest.mark.filterwarnings("ignore::sdnn.estimators.OutlierWarning"
 
 
 def transcribed(model):
-    """The transcribed layer with the tables and first weights of the core's."""
-    code = model.network_.input_code
-    plain = estimator_transcription.SelectiveDesensitization(
-        code.modified, code.modifiers, code.core_pairs
+    """Return the layer in NumPy, with the tables and first weights of the model's network."""
+    input_code = model.network_.input_code
+    code = estimator_transcription.SelectiveDesensitization(
+        input_code.modified, input_code.modifiers, input_code.core_pairs
     )
-    return estimator_transcription.ParallelPerceptron(plain, model.weights_, model.thresholds_)
+    return estimator_transcription.ParallelPerceptron(code, model.weights_, model.thresholds_)
 
 
 def untrained(model, X, y):
-    """The model before its first sample, and its targets as the trainer has them."""
+    """Return the model before its first sample, and its targets in the form of the trainer."""
     table, targets = model._check_samples(X, y, codings=None)
     model._begin(X, table, targets)
     return model, model._targets(targets)
@@ -30,7 +30,7 @@ def untrained(model, X, y):
 
 @st.composite
 def problems(draw):
-    """Small samples with ties, constant inputs and coarse targets among them."""
+    """Draw samples, some with ties and constant inputs, targets, options, and orders of epochs."""
     n_inputs = draw(st.integers(1, 4))
     n_samples = draw(st.integers(3, 14))
     values = st.integers(0, draw(st.integers(1, 9)))
@@ -42,7 +42,7 @@ def problems(draw):
         )
     )
     y = draw(st.lists(st.integers(0, 3), min_size=n_samples, max_size=n_samples))
-    y[:2] = [0, 3]
+    y[:2] = [0, 3]  # a range of targets is not empty, and there are two classes
     options = {
         "coding": RandomInverse(n_bins=draw(st.integers(2, 20)), n_flipped=draw(st.integers(1, 4))),
         "n_pattern_units": 2 * draw(st.integers(4, 40)),
@@ -55,7 +55,7 @@ def problems(draw):
     return np.array(X, dtype=float), np.array(y), options, orders
 
 
-def agree(model, layer, X):
+def assert_equal_bits(model, layer, X):
     np.testing.assert_array_equal(model.weights_, layer.weights)
     np.testing.assert_array_equal(model.thresholds_, layer.thresholds)
     bins = model.network_.input_code.bins(X)
@@ -78,7 +78,7 @@ def test_the_regressor_has_the_bits_of_its_transcription(problem, n_outputs, n_o
     for order in orders:
         assert tuple(fast.present(np.array(order, dtype=np.int32))) == slow.present(order)
     fast.synchronize()
-    agree(model, layer, X)
+    assert_equal_bits(model, layer, X)
     low, step = model.output_range_[:, 0], model._step()
     expected = step * layer.counts(bins, n_outputs) + low
     np.testing.assert_array_equal(model.predict(X), expected)
@@ -93,11 +93,11 @@ def test_the_classifier_has_the_bits_of_its_transcription(problem, scheme):
     slow = estimator_transcription.PerceptronTrainer(
         layer, model.network_.input_code.bins(X), labels, len(model.classes_), scheme
     )
-    fast = model._trainer(model.network_.input_code.bins(X), labels, 3)
+    fast = model._trainer(model.network_.input_code.bins(X), labels, n_epochs=3)
     for order in orders:
         assert tuple(fast.present(np.array(order, dtype=np.int32))) == slow.present(order)
     fast.synchronize()
-    agree(model, layer, X)
+    assert_equal_bits(model, layer, X)
 
 
 @pytest.mark.parametrize("regression", [True, False])
@@ -124,4 +124,4 @@ def test_fit_draws_two_seeds_and_then_a_permutation_per_epoch(regression):
     orders.randint(2**31 - 1, size=2)
     corrected = [slow.present(orders.permutation(30))[0] for _ in range(model.n_iter_)]
     assert model.n_corrected_.tolist() == corrected
-    agree(model, layer, X)
+    assert_equal_bits(model, layer, X)

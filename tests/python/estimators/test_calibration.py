@@ -23,6 +23,7 @@ EARLY = {"early_stopping": True, "validation_fraction": 0.94}
 
 
 def overlapping(n_samples=600, seed=0):
+    """Return samples of two classes that overlap."""
     random = np.random.RandomState(seed)
     X = random.uniform(-1, 1, (n_samples, 3))
     return X, (X[:, 0] + X[:, 1] + 0.7 * random.normal(size=n_samples) > 0).astype(int)
@@ -34,15 +35,16 @@ def noisy(n_samples, seed=0):
     return X, np.sin(3 * X[:, 0]) + X[:, 1] + 0.3 * random.normal(size=n_samples)
 
 
-def losses_of(model, X, y):
-    return -np.log(model.predict_proba(X)[np.arange(len(y)), y])
+def log_loss(model, X, y):
+    return -np.log(model.predict_proba(X)[np.arange(len(y)), y]).mean()
 
 
 def test_a_fifth_of_each_class_is_held_out():
     labels = np.repeat([0, 1, 2], [50, 20, 5])
-    is_held = held_out_fifth(labels, True, 3)
+    seed = 3
+    is_held = held_out_fifth(labels, True, seed)
     assert [int(is_held[labels == label].sum()) for label in range(3)] == [10, 4, 1]
-    assert held_out_fifth(np.zeros(100), False, 3).sum() == 20
+    assert held_out_fifth(np.zeros(100), False, seed).sum() == 20, "of targets that are no labels"
 
 
 def test_the_steepness_has_the_smallest_log_loss_on_the_held_out_fifth():
@@ -51,20 +53,23 @@ def test_the_steepness_has_the_smallest_log_loss_on_the_held_out_fifth():
     model = SDNNClassifier(**OPTIONS, calibrate=True).fit(points, labels)
     np.testing.assert_array_equal(model.weights_, plain.weights_)
     is_held = held_out_fifth(labels, True, model._weight_seed)
-    part = clone(plain).set_params(
+    # A network with the codings and pairs of the whole fit learns the other four fifths.
+    without_fifth = clone(plain).set_params(
         random_state=model._weight_seed,
         coding=[(coding, [index]) for index, coding in enumerate(plain.codings_)],
         pairs=plain.pairs_,
     )
-    part.fit(points[~is_held], labels[~is_held])
-    scores = np.log(part.predict_proba(points[is_held])) / STEEPNESS  # plus a number per sample
+    without_fifth.fit(points[~is_held], labels[~is_held])
+    # The decisions but for a constant of each sample, which does not change a softmax.
+    scores = np.log(without_fifth.predict_proba(points[is_held])) / STEEPNESS
 
     def loss(steepness):
         raised = np.exp(steepness * (scores - scores.max(axis=1, keepdims=True)))
-        shares = raised / raised.sum(axis=1, keepdims=True)
-        of_labels = np.log(shares[np.arange(len(shares)), labels[is_held]])
-        random = 0.5 / (0.5 + len(shares))  # share of half a sample of a random class
-        return -((1 - random) * of_labels + random * np.log(shares).mean(axis=1)).mean()
+        probabilities = raised / raised.sum(axis=1, keepdims=True)
+        logs = np.log(probabilities)
+        of_labels = logs[np.arange(len(logs)), labels[is_held]]
+        random = 0.5 / (0.5 + len(logs))  # the weight of half a sample of a random class
+        return -((1 - random) * of_labels + random * logs.mean(axis=1)).mean()
 
     best = min(map(loss, np.geomspace(*STEEPNESSES, 1000)))
     np.testing.assert_allclose(loss(model.steepness_), best, rtol=1e-4)
@@ -90,9 +95,7 @@ def test_calibration_lowers_the_loss_where_classes_overlap():
     X, y = overlapping()
     model = SDNNClassifier(**OPTIONS, calibrate=True).fit(X[:400], y[:400])
     plain = SDNNClassifier(**OPTIONS, calibrate=False).fit(X[:400], y[:400])
-    assert (
-        losses_of(model, X[400:], y[400:]).mean() < losses_of(plain, X[400:], y[400:]).mean() - 0.02
-    )
+    assert log_loss(model, X[400:], y[400:]) < log_loss(plain, X[400:], y[400:]) - 0.02
     model.set_params(calibrate=False).fit(X[:400], y[:400])
     assert not hasattr(model, "steepness_")
 
@@ -105,14 +108,14 @@ def test_a_classifier_is_calibrated_by_default_where_a_fifth_can_be_held_out(mon
     assert default.steepness_ == calibrated.steepness_
     not_calibrated = [
         SDNNClassifier(**OPTIONS).fit(X[:9], y[:9]),
-        SDNNClassifier(**OPTIONS, **EARLY).fit(X[:10], y[:10]),  # eight: too few to hold out .94
+        SDNNClassifier(**OPTIONS, **EARLY).fit(X[:10], y[:10]),  # 94 % of 8 leave too few
         SDNNClassifier(**OPTIONS).fit(X, np.arange(60) % 29),  # 60 - 12 samples of 29 classes
         SDNNClassifier(**OPTIONS).fit(X[:12], np.arange(12)),  # classes of a single sample
         SDNNClassifier(**OPTIONS, n_units_per_class=1).fit(X, y),
         SDNNClassifier(**OPTIONS, warm_start=True).fit(X, y),
         SDNNClassifier(**OPTIONS).partial_fit(X, y, classes=[0, 1]),
     ]
-    monkeypatch.setattr(classifier, "MOST_CALIBRATED", 59)
+    monkeypatch.setattr(classifier, "MOST_CALIBRATED", len(X) - 1)  # samples
     not_calibrated.append(SDNNClassifier(**OPTIONS).fit(X, y))
     assert not any(hasattr(model, "steepness_") for model in not_calibrated)
 
@@ -120,11 +123,11 @@ def test_a_classifier_is_calibrated_by_default_where_a_fifth_can_be_held_out(mon
 def test_only_the_network_of_the_selected_features_is_calibrated(monkeypatch):
     calibrated = []
 
-    def note(fitted, *samples, **options):
+    def record_and_learn(fitted, *samples, **options):
         calibrated.append(fitted)
         return learn_without_fifth(fitted, *samples, **options)
 
-    monkeypatch.setattr(classifier, "learn_without_fifth", note)
+    monkeypatch.setattr(classifier, "learn_without_fifth", record_and_learn)
     model = SDNNClassifier(pairs="auto", **OPTIONS).fit(*overlapping(60))
     assert len(calibrated) == 1
     assert calibrated[0].pairs_ == model.pairs_
@@ -190,7 +193,7 @@ def test_intervals_of_the_regressor_contain_their_share_of_new_targets(tmp_path)
     sizes = np.sort(np.abs(model.held_out_residuals_[:, 0]))
     rank = math.ceil(0.9 * (len(sizes) + 1))
     half_widths = np.diff(model.predict_interval(X, 0.9), axis=1) / 2
-    np.testing.assert_allclose(half_widths, sizes[rank - 1], rtol=1e-9)
+    np.testing.assert_allclose(half_widths, sizes[rank - 1], rtol=1e-9)  # the held-out error
     model.save(tmp_path / "model")
     loaded = SDNNRegressor.load(tmp_path / "model")
     np.testing.assert_array_equal(loaded.predict_interval(X), model.predict_interval(X))
@@ -231,7 +234,7 @@ def test_calibration_refuses_unsuitable_options_coverages_and_damaged_files(tmp_
         damaged.save(path)
         refuses("held-out", SDNNRegressor.load, path)
     classes = SDNNClassifier(**OPTIONS, calibrate=True).fit(X, y > 0)
-    for steepness in (0.0, 26.0, float("nan")):
+    for steepness in (0.0, STEEPNESSES[1] + 1, float("nan")):
         classes.steepness_ = steepness
         classes.save(path)
         refuses("steepness_", SDNNClassifier.load, path)

@@ -39,6 +39,7 @@ def points(n_samples, n_inputs=4, seed=0):
 
 
 def errors_of(model, rows, targets):
+    """Learn the samples in order; return the error of each prediction before it is learned."""
     errors = []
     for x, y in zip(rows, targets, strict=True):
         errors.append(model.predict_one(x) - y)
@@ -47,7 +48,7 @@ def errors_of(model, rows, targets):
 
 
 class SlowLeastSquares:
-    """Recursive least squares by its formulas, without bounds."""
+    """Recursive least squares by its formulas, without limits of weights and covariances."""
 
     def __init__(self, low, high, forgetting):
         self.middle, self.half = (high + low) / 2, (high - low) / 2
@@ -147,9 +148,9 @@ def test_without_other_experts_predictions_are_those_of_the_network(river):
     rows = points(150)
     targets = [x["x0"] * x["x1"] for x in rows]
     labels = [target > 0 for target in targets]
-    for make, goals in ((regressor, targets), (classifier, labels)):
+    for make, targets_or_labels in ((regressor, targets), (classifier, labels)):
         model = make(river, experts="network", grace_period=50)
-        for x, y in zip(rows, goals, strict=True):
+        for x, y in zip(rows, targets_or_labels, strict=True):
             model.learn_one(x, y)
         expected = [model.fitted.predict_one(model._sample(x)) for x in rows]
         assert [model.predict_one(x) for x in rows] == expected
@@ -166,15 +167,15 @@ def test_learning_does_not_depend_on_predictions(river, experts):
     rows = points(400)
     targets = [x["x0"] + math.sin(5 * x["x1"]) for x in rows]
     labels = ["low" if target < 0 else "high" for target in targets]
-    for make, goals in ((regressor, targets), (classifier, labels)):
-        predicting, silent = make(river, experts), make(river, experts)
-        for x, y in zip(rows, goals, strict=True):
+    for make, targets_or_labels in ((regressor, targets), (classifier, labels)):
+        predicting, learning = make(river, experts), make(river, experts)
+        for x, y in zip(rows, targets_or_labels, strict=True):
             predicting.predict_one(x)
             predicting.predict_one({**x, "x0": True})  # equals 1.0, but is not the learned sample
             predicting.learn_one(x, y)
-            silent.learn_one(x, y)
-        assert predicting.weights_ == silent.weights_
-        assert [predicting.predict_one(x) for x in rows] == [silent.predict_one(x) for x in rows]
+            learning.learn_one(x, y)
+        assert predicting.weights_ == learning.weights_
+        assert [predicting.predict_one(x) for x in rows] == [learning.predict_one(x) for x in rows]
 
 
 @pytest.mark.parametrize("experts", ["network", "linear", "window"])
@@ -196,7 +197,7 @@ def test_copies_and_pickles_continue_learning_with_the_same_bits(river, make, ex
         assert other.weights_ == model.weights_
     fresh = model.clone()
     assert fresh.mixed is None
-    assert list(fresh.weights_.values()) == [1.0]
+    assert list(fresh.weights_.values()) == [1.0], "a clone has learned nothing"
 
 
 @pytest.mark.parametrize("experts", ["linear", "window"])
@@ -204,15 +205,16 @@ def test_features_that_come_late_and_go_are_learned_by_regression(river, experts
     model, rows = regressor(river, experts), points(1500, 3)
     errors = []
     for number, x in enumerate(rows):
-        y = x["x0"] + (2 * x["x2"] if number >= 500 else 0.0)
-        present = {name: value for name, value in x.items() if name != "x2" or number >= 500}
-        if number >= 500:
-            present["word"] = "up" if number % 2 else "down"
-            y += present["word"] == "up"
+        y = x["x0"]
+        if number < 500:
+            del x["x2"]
+        else:  # the feature x2 and a word appear, and the target depends on them
+            x["word"] = "up" if number % 2 else "down"
+            y += 2 * x["x2"] + (x["word"] == "up")
         if number % 7 == 0:
-            del present["x1"]
-        errors.append(abs(model.predict_one(present) - y))
-        model.learn_one(present, y)
+            del x["x1"]
+        errors.append(abs(model.predict_one(x) - y))
+        model.learn_one(x, y)
     assert set(model.mixed.columns.numbers) == {"x0", "x1", "x2"}
     assert set(model.mixed.columns.categories["word"]) == {"up", "down"}
     assert np.mean(errors[-200:]) < 0.02
@@ -228,9 +230,9 @@ def test_classes_with_a_linear_boundary_have_better_probabilities_with_regressio
     model, alone = classifier(river), classifier(river, "network")
     losses = {model: [], alone: []}
     for x, y in zip(rows, labels, strict=True):
-        for made, of_model in losses.items():
-            of_model.append(-math.log(max(made.predict_proba_one(x).get(y, 0.0), 1e-6)))
-            made.learn_one(x, y)
+        for either, its_losses in losses.items():
+            its_losses.append(-math.log(max(either.predict_proba_one(x).get(y, 0.0), 1e-6)))
+            either.learn_one(x, y)
     assert np.mean(losses[model][200:]) < np.mean(losses[alone][200:]) - 0.05
     shares = model.predict_proba_one(rows[0])
     assert sum(shares.values()) == pytest.approx(1.0)
@@ -241,7 +243,7 @@ def test_classes_with_a_linear_boundary_have_better_probabilities_with_regressio
 
 def test_a_class_that_appears_late_is_predicted_also_with_single_units(river):
     rows = points(500)
-    order = np.argsort([x["x0"] > 0.4 for x in rows], kind="stable")
+    order = np.argsort([x["x0"] > 0.4 for x in rows], kind="stable")  # class "high" comes last
     name = {False: "low", True: "middle"}
     model = classifier(river, "window", grace_period=40)
     single = river.RiverClassifier(SDNNClassifier(n_units_per_class=1, **OPTIONS), grace_period=40)
@@ -265,8 +267,10 @@ def test_extreme_inputs_and_targets_give_finite_predictions(river, scale):
     model = regressor(river, "window", grace_period=20)
     for number in range(300):
         x = {"a": random.normal() * scale, "constant": 3.0, "b": EXTREMES[number % 11]}
-        y = EXTREMES[(number * number) % 11] if number > 40 and number % 3 == 0 else None
-        y = random.normal() * min(scale, 1e299) if y is None or abs(y) > 1e300 else y
+        y = EXTREMES[(number * number) % 11]
+        is_extreme = number > 40 and number % 3 == 0  # the grace period ends before
+        if not is_extreme or y is None or abs(y) > 1e300:
+            y = random.normal() * min(scale, 1e299)
         assert math.isfinite(model.predict_one(x)), number
         model.learn_one(x, y)
         assert all(0 <= weight <= 1 for weight in model.weights_.values())
@@ -285,7 +289,7 @@ def test_the_window_expert_has_smaller_errors_on_a_smooth_function(river):
     rows = points(600)
     targets = [math.sin(3 * x["x0"]) * x["x1"] + x["x2"] ** 2 + x["x3"] for x in rows]
     model, linear = regressor(river, "window"), regressor(river)
-    squares = [np.square(errors_of(made, rows, targets)[150:]).mean() for made in (model, linear)]
+    squares = [np.square(errors_of(m, rows, targets)[150:]).mean() for m in (model, linear)]
     assert squares[0] < 0.7 * squares[1], "mean squared errors after the first 150 samples"
     assert set(model.weights_) == {"mean", "linear", "window", "network"}
     assert model.weights_["window"] > 0.5

@@ -29,7 +29,7 @@ class InjectedError(BaseException):
 
 
 class FailAtCall:
-    """Raises when the n-th function is called, of Python or C; counts them."""
+    """Profiler that counts calls of functions, of Python or C, and raises an error at the n-th."""
 
     def __init__(self, n):
         self.n = n
@@ -42,8 +42,8 @@ class FailAtCall:
                 raise InjectedError
 
     def stops(self, work):
-        """Whether the error came out of the work; the collector of garbage would call others."""
-        gc.disable()
+        """Return whether the call ``work()`` raised the error."""
+        gc.disable()  # it would call other functions
         sys.setprofile(self)
         try:
             work()
@@ -59,11 +59,11 @@ class FailAtCall:
         return False
 
 
-KINDS = {
+ESTIMATORS = {
     "regressor": (SDNNRegressor, {"output_range": (-2, 2), "n_output_units": 8}, Y),
     "classifier": (SDNNClassifier, {}, LABELS),
 }
-WORKS = {
+METHODS = {
     "fit": lambda model, y: model.fit(X, y),
     "partial_fit": lambda model, y: model.partial_fit(X, y),
     "learn_one": lambda model, y: model.learn_one(X[3], y[3]),
@@ -71,45 +71,45 @@ WORKS = {
 
 
 def new_model(name, **options):
-    estimator, settings, y = KINDS[name]
+    """Return an unfitted estimator and targets for it."""
+    estimator, settings, y = ESTIMATORS[name]
     return estimator(UNIT, **{**OPTIONS, **settings, **options}), y
 
 
-def state_of(model):
-    """All that the estimator knows, with the bits of its weights."""
-    return pickle.dumps(model)
+state_of = pickle.dumps  # all that an estimator knows, with the bits of its weights
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # in generators
 @pytest.mark.parametrize("training", ["auto", "block"])
-@pytest.mark.parametrize("name", KINDS)
-@pytest.mark.parametrize("work", WORKS)
-def test_an_error_at_any_call_leaves_the_model_unchanged(name, work, training):
+@pytest.mark.parametrize("name", ESTIMATORS)
+@pytest.mark.parametrize("method", METHODS)
+def test_an_error_at_any_call_leaves_the_model_unchanged(name, method, training):
+    learn = METHODS[method]
     model, y = new_model(name, training=training)
     model.fit(X[::-1], y[::-1]).learn_one(X[0], y[0])
     before = state_of(model)
-    counting = FailAtCall(-1)
-    copy = WORKS[work](pickle.loads(before), y)
-    counting.stops(lambda: WORKS[work](copy, y))
+    counting = FailAtCall(-1)  # raises no error
+    copy = learn(pickle.loads(before), y)
+    counting.stops(lambda: learn(copy, y))
     last = counting.n_calls
     calls = np.random.RandomState(1).randint(1, last, size=90)
     calls = [*calls, *range(max(1, last - 10), last + 1)]
     n_failed = 0
     for n in calls:
-        if FailAtCall(n).stops(functools.partial(WORKS[work], model, y)):
+        if FailAtCall(n).stops(functools.partial(learn, model, y)):
             n_failed += 1
             assert state_of(model) == before, n
-        else:  # some libraries go on after an error of a callback
+        else:  # some libraries catch errors of functions that they call
             model, _ = new_model(name, training=training)
             model.fit(X[::-1], y[::-1]).learn_one(X[0], y[0])
     assert n_failed > 0.75 * len(calls)
 
 
-@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("name", ESTIMATORS)
 def test_a_failed_first_fit_leaves_an_unfitted_model(name):
     model, y = new_model(name)
     before = state_of(model)
-    for n in np.random.RandomState(2).randint(1, 300, size=50):
+    for n in np.random.RandomState(2).randint(1, 300, size=50):  # it makes more than 300 calls
         assert FailAtCall(n).stops(lambda: model.fit(X, y))
         assert state_of(model) == before
     model.set_params(training="dual", memory_limit=100)
@@ -118,7 +118,7 @@ def test_a_failed_first_fit_leaves_an_unfitted_model(name):
     assert state_of(model) == before
 
 
-@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("name", ESTIMATORS)
 def test_refused_samples_do_not_change_the_model(name):
     model, y = new_model(name)
     model.fit(X, y)
@@ -141,7 +141,10 @@ def test_refused_samples_do_not_change_the_model(name):
 
 
 def seconds_until_interrupted(work):
-    """How long work goes on after SIGINT, in processor time: others may use the machine."""
+    """Return the processor time from SIGINT, sent after 0.4 s, to the end of the call ``work()``.
+
+    The time on the clock would depend on other processes.
+    """
     sent = []
 
     def interrupt():
@@ -171,7 +174,7 @@ def test_ctrl_c_ends_training_within_a_second_and_keeps_the_model(training):
     targets = RANDOM.uniform(0, 1, len(MANY))
     assert seconds_until_interrupted(lambda: model.fit(MANY, targets)) < 1
     assert state_of(model) == before
-    n_times = 1 if training == "dual" else 20
+    n_times = 1 if training == "dual" else 20  # so that an epoch takes longer than 0.4 s
     samples, values = np.tile(MANY, (n_times, 1)), np.tile(targets, n_times)
     assert seconds_until_interrupted(lambda: model.partial_fit(samples, values)) < 1
     assert state_of(model) == before

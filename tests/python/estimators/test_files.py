@@ -47,14 +47,14 @@ MODELS = {
 }
 
 
-def in_lists(parameters):
-    """JSON knows no tuples: compare as if there were none."""
+def with_lists(parameters):
+    """Return the parameters as text in which tuples are lists, since JSON has no tuples."""
     return str(parameters).translate(str.maketrans("()", "[]"))
 
 
 FRAME = pd.DataFrame({"a": X[:, 0], "b": np.digitize(X[:, 1], [0.3, 0.6]), "c": X[:, 2]})
 LABELS = np.digitize(Y, [0])
-NUMPY = (np.int64(40), np.float32(0.3), np.bool_(True))
+INT, FLOAT, TRUE = np.int64(40), np.float32(0.3), np.bool_(True)
 
 
 @pytest.mark.parametrize(
@@ -62,16 +62,16 @@ NUMPY = (np.int64(40), np.float32(0.3), np.bool_(True))
     [
         SDNNClassifier(class_weight={0: 1.0, 1: 2.5}, **SMALL),
         SDNNClassifier(class_weight={label: np.float32(2) for label in np.unique(LABELS)}, **SMALL),
-        SDNNRegressor(RandomInverse(n_bins=NUMPY[0], length_scale=NUMPY[1]), **SMALL),
-        SDNNRegressor(WithMissing(base=RandomInverse(low=np.float32(-1), high=NUMPY[0])), **SMALL),
+        SDNNRegressor(RandomInverse(n_bins=INT, length_scale=FLOAT), **SMALL),
+        SDNNRegressor(WithMissing(base=RandomInverse(low=np.float32(-1), high=INT)), **SMALL),
         SDNNRegressor([(Symbolic(categories=np.arange(3)), ["b"])], **SMALL),
         SDNNRegressor([(Anchor(n_interpolated=np.int32(9)), FRAME.columns[:2])], **SMALL),
         SDNNRegressor([("anchor", range(2))], **SMALL),
         SDNNRegressor([("anchor", {"a", "b"})], **SMALL),
         SDNNRegressor([("anchor", pd.Series([True, False, True]))], **SMALL),
-        SDNNRegressor([("anchor", slice(NUMPY[0] - 40, np.int64(2)))], **SMALL),
-        SDNNRegressor(pairs=np.array([[0, 1], [1, 2]]), n_jobs=np.int64(1), verbose=NUMPY[2] & 0),
-        SDNNRegressor(output_range=pd.DataFrame([[-3, 3]]), early_stopping=NUMPY[2], **SMALL),
+        SDNNRegressor([("anchor", slice(np.int64(0), np.int64(2)))], **SMALL),
+        SDNNRegressor(pairs=np.array([[0, 1], [1, 2]]), n_jobs=np.int64(1), verbose=np.int64(0)),
+        SDNNRegressor(output_range=pd.DataFrame([[-3, 3]]), early_stopping=TRUE, **SMALL),
     ],
 )
 def test_settings_of_numpy_and_pandas_types_are_saved(model, tmp_path):
@@ -103,16 +103,16 @@ def test_a_loaded_estimator_equals_the_saved_estimator(name, tmp_path):
     model.fit(samples, targets)
     path = tmp_path / "model.safetensors"
     model.save(path)
-    same = type(model).load(path)
-    np.testing.assert_array_equal(same.predict(samples), model.predict(samples))
-    np.testing.assert_array_equal(same.weights_, model.weights_)
-    assert same.weights_.dtype == np.int32
-    assert same.codings_ == model.codings_
-    assert in_lists(same.get_params()) == in_lists(model.get_params())
-    assert set(vars(same)) == set(vars(model))
-    same.partial_fit(samples, targets)
+    loaded = type(model).load(path)
+    np.testing.assert_array_equal(loaded.predict(samples), model.predict(samples))
+    np.testing.assert_array_equal(loaded.weights_, model.weights_)
+    assert loaded.weights_.dtype == np.int32
+    assert loaded.codings_ == model.codings_
+    assert with_lists(loaded.get_params()) == with_lists(model.get_params())
+    assert set(vars(loaded)) == set(vars(model))
+    loaded.partial_fit(samples, targets)
     model.partial_fit(samples, targets)
-    np.testing.assert_array_equal(same.weights_, model.weights_)
+    np.testing.assert_array_equal(loaded.weights_, model.weights_)
 
 
 def test_load_refuses_the_file_of_another_class(tmp_path):
@@ -122,7 +122,7 @@ def test_load_refuses_the_file_of_another_class(tmp_path):
 
 
 def nested(depth):
-    """A coding within a coding within a coding."""
+    """Return the description of a coding within a coding, and so on to this depth."""
     coding = {"coding": "random-inverse"}
     for _ in range(depth):
         coding = {"coding": "with-missing", "base": coding}

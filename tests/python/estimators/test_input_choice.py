@@ -59,17 +59,17 @@ def test_directions_are_in_units_of_the_features():
     X = uniform(400, 4) * [1, 100, 1e-3, 1] + [0, 5e4, 0, -7]
     model = SDNNKernelRidge().fit(X, wave(uniform(400, 4)))
     mixed = X @ model.directions_.T
+    # The model's columns after those of the features are the mixed features, but for a constant.
     columns = model.X_fit_[:, len(model.selected_features_) :]
-    for column, of_directions in zip(columns.T, mixed.T, strict=True):
-        differences = column - of_directions
-        np.testing.assert_allclose(differences, differences[0], rtol=1e-6)
+    differences = columns - mixed
+    np.testing.assert_allclose(differences, differences[:1].repeat(len(X), axis=0), rtol=1e-6)
 
 
 @pytest.mark.parametrize("n_features", [1, 2, 6])
 def test_noise_leaves_all_features_and_no_directions(n_features):
     X = uniform(200, n_features)
     noise = np.random.RandomState(1).normal(size=200)
-    chosen, every = (SDNNKernelRidge(inputs=w).fit(X, noise) for w in ("auto", "all"))
+    chosen, every = (SDNNKernelRidge(inputs=i).fit(X, noise) for i in ("auto", "all"))
     assert chosen.selected_features_.tolist() == list(range(n_features))
     assert chosen.directions_.shape == (0, n_features)
     assert np.array_equal(chosen.predict(X), every.predict(X))
@@ -117,6 +117,7 @@ def test_weights_choose_like_repeated_samples():
 
 
 def choice_of(X, y, degree):
+    """Return the choice among the inputs X, its candidate with all of them, and their codings."""
     codings = [RandomInverse().fit(column, N_UNITS) for column in X.T]
     ones = np.ones(len(X))
     choice = InputChoice(codings, X, Samples(y[:, None], ones, ones), [degree])
@@ -124,7 +125,6 @@ def choice_of(X, y, degree):
 
 
 def test_importance_is_the_change_where_a_feature_is_averaged_away():
-    """Averages the outputs over all values of a feature, one at a time."""
     X = uniform(30, 3)
     choice, candidate, codings = choice_of(X, X[:, 0] + X[:, 1] * X[:, 2], degree=1)
     table, kernel = choice._table, AnalyticKernel(codings)
@@ -133,10 +133,11 @@ def test_importance_is_the_change_where_a_feature_is_averaged_away():
         return kernel(samples, table) @ candidate.solution.dual
 
     for feature, importance in enumerate(choice._importances(candidate)):
-        replaced = [table.copy() for _ in table]
-        for copy, value in zip(replaced, table[:, feature], strict=True):
+        # In each copy of the table, all samples have the feature's value of one sample.
+        copies = [table.copy() for _ in table]
+        for copy, value in zip(copies, table[:, feature], strict=True):
             copy[:, feature] = value
-        changes = outputs(table) - np.mean([outputs(copy) for copy in replaced], axis=0)
+        changes = outputs(table) - np.mean([outputs(copy) for copy in copies], axis=0)
         expected = np.square(changes).mean() / choice._variances[0]  # a share of the variance
         np.testing.assert_allclose(importance, expected)
 
@@ -145,10 +146,11 @@ def test_importance_is_the_change_where_a_feature_is_averaged_away():
 def test_gradients_of_a_plane_have_its_slopes(degree):
     X = uniform(300, 2)
     choice, candidate, _ = choice_of(X, 3 * X[:, 0] - X[:, 1], degree)
-    inner = np.abs(choice._table[: len(choice._gradient(candidate, 0))]).max(axis=1) < 0.7
-    deviations = X.std(axis=0)
+    n_gradients = len(choice._gradient(candidate, 0))  # of the first samples of the table
+    is_inner = np.abs(choice._table[:n_gradients]).max(axis=1) < 0.7
+    deviations = X.std(axis=0)  # gradients are differences per standard deviation
     for feature, slope in enumerate((3.0, -1.0)):
-        gradient = np.median(choice._gradient(candidate, feature)[inner])
+        gradient = np.median(choice._gradient(candidate, feature)[is_inner])
         assert gradient == pytest.approx(slope * deviations[feature], rel=0.15)
 
 

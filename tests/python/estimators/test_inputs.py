@@ -87,12 +87,12 @@ def test_lists_with_words_have_the_bits_of_arrays(estimator):
 
 
 def test_numbers_in_lists_with_words_remain_numbers():
-    counts = [[color, size > 5, int(size)] for color, size in LISTED]
-    model = SDNNRegressor([("symbolic", [0, 1, 2])], **SMALL).fit(counts, TARGETS)
+    rows = [[color, size > 5, int(size)] for color, size in LISTED]  # sizes are below 9
+    model = SDNNRegressor([("symbolic", [0, 1, 2])], **SMALL).fit(rows, TARGETS)
     assert [coding.categories for coding in model.codings_] == [
         ("blue", "green", "red"), (False, True), tuple(range(1, 9)),
     ]  # fmt: skip
-    assert model.predict_one(counts[0]) == model.predict(counts[:1])[0]
+    assert model.predict_one(rows[0]) == model.predict(rows[:1])[0]
     assert model.predict_one(["red", True, 3]) == model.predict([["red", True, 3]])[0]
     refuses("words", model.fit, [["red", True, 3], ["blue", True, "4"]], [0, 1])
 
@@ -121,7 +121,7 @@ def test_missing_values_and_unknown_categories_can_have_separate_patterns(tmp_pa
     holes.loc[1::5, "color"] = None
     model = SDNNRegressor(coding, max_iter=100, **SMALL).fit(holes, TARGETS)
     assert model.score(TABLE, TARGETS) > 0.9
-    unknown = model.predict(holes.assign(color="pink"))
+    unknown = model.predict(holes.assign(color="pink"))  # coded as a missing color
     np.testing.assert_array_equal(unknown, model.predict(holes.assign(color=pd.NA)))
     assert np.isfinite(unknown).all()
     model.save(tmp_path / "model")
@@ -170,7 +170,7 @@ def test_inputs_in_no_pair_do_not_change_predictions():
     other = x.copy()
     other[:, 2] = 0.5
     np.testing.assert_array_equal(model.predict(x), model.predict(other))
-    assert model.transform_code(x).shape == (50, 2 * 256)
+    assert model.transform_code(x).shape == (50, 2 * 256)  # samples, units of two pairs
 
 
 def test_shared_tables_are_permutations_and_separate_ones_differ():
@@ -178,10 +178,12 @@ def test_shared_tables_are_permutations_and_separate_ones_differ():
     pairs = input_pairs("all", None, 3)
     shared = draw_input_code(codings, pairs, 64, "shared", 1)
     assert len({id(table) for table in shared.modified}) == len(codings)
-    tables = {mu: table for (mu, _), table in zip(pairs, shared.modified, strict=True)}
+    # A pair (mu, nu) is the pattern of input mu, modified by that of input nu.
+    table_of_input = {mu: table for (mu, _), table in zip(pairs, shared.modified, strict=True)}
     for (_, nu), modifier in zip(pairs, shared.modifiers, strict=True):
-        assert not np.array_equal(tables[nu], modifier)
-        assert sorted(tables[nu].T.tolist()) == sorted(modifier.T.tolist()), "the same units"
+        table = table_of_input[nu]
+        assert not np.array_equal(table, modifier)
+        assert sorted(table.T.tolist()) == sorted(modifier.T.tolist()), "the same units, reordered"
     separate = draw_input_code(codings, pairs, 64, "separate", 1)
     tables = [*separate.modified, *separate.modifiers]
     assert len({table.tobytes() for table in tables}) == 2 * len(pairs), "two for each pair"
@@ -227,7 +229,7 @@ def test_dates_are_refused_by_name():
     for frame in frames:
         for coding in ("random-inverse", [("symbolic", ["when"])]):
             refuses("when", SDNNRegressor(coding, **SMALL).fit, frame, y)
-    refuses("0", SDNNRegressor(**SMALL).fit, days.to_numpy()[:, None], y)
+    refuses("0", SDNNRegressor(**SMALL).fit, days.to_numpy()[:, None], y)  # number of the column
     objects = np.array([[1.0, day] for day in days.to_pydatetime()], dtype=object)
     refuses("1", SDNNRegressor(**SMALL).fit, objects, y)
 
@@ -239,9 +241,8 @@ def test_set_params_reaches_listed_codings_by_number_or_all_at_once():
     assert (first.n_interpolated, second.base.period, third.period) == (8, 7.0, 24.0)
     parameters = model.get_params()
     assert parameters["coding__2__period"] == 24.0
-    clone(model).set_params(
-        **{name: parameters[name] for name in parameters if name.startswith("coding__")}
-    )
+    of_codings = {name: parameters[name] for name in parameters if name.startswith("coding__")}
+    clone(model).set_params(**of_codings)  # raises an error if one of them is unknown
     assert SDNNRegressor("circular").get_params()["coding__period"] == Circular().period
     assert "coding__period" not in SDNNRegressor("circular").get_params(deep=False)
     refuses("coding__rho", model.set_params, coding__rho=0.5)
@@ -261,8 +262,8 @@ def test_categorical_columns_are_symbols_without_a_coding(estimator):
         np.testing.assert_array_equal(model.predict(typed), expected_model.predict(TABLE))
         # Columns of the type category and of strings are the same inputs.
         np.testing.assert_array_equal(model.predict(TABLE), expected_model.predict(TABLE))
-    gap = typed.assign(color=typed["color"].cat.remove_categories(["red"]))
-    assert np.isfinite(model.predict(gap)).all()
+    without_red = typed.assign(color=typed["color"].cat.remove_categories(["red"]))  # missing now
+    assert np.isfinite(model.predict(without_red)).all()
     numbers = TABLE.assign(color=pd.Categorical(TABLE["color"].map({"red": 1, "blue": 2})))
     assert np.isfinite(estimator(**options).fit(numbers, TARGETS).predict(numbers)).all()
 

@@ -19,8 +19,6 @@ from sdnn.coding.kernel import N_UNITS, AnalyticKernel
 RANDOM = np.random.RandomState(0)
 X = RANDOM.uniform(0, 1, (120, 4))
 Y = np.sin(5 * X[:, 0]) * X[:, 1] + X[:, 2]
-
-
 LABELS = np.array(["low", "middle", "high"])[np.digitize(Y, [0.2, 0.8])]
 
 
@@ -33,21 +31,21 @@ def test_scikit_learns_check_estimator_finds_no_fault(model):
     assert set(not_passed.values()) <= {"skipped"}
 
 
-def kernels(degree, fresh=X):
-    """The kernel of a degree, of samples and all training samples, from the training ranges."""
+def kernel_matrix(degree, samples=X):
+    """Return the kernel of samples and all training samples; codings are fitted to the latter."""
     coding = RandomInverse()
-    kernel = AnalyticKernel([coding.fit(column, N_UNITS) for column in X.T])(fresh, X)
+    kernel = AnalyticKernel([coding.fit(column, N_UNITS) for column in X.T])(samples, X)
     return {1: kernel, 2: (kernel + kernel**2) / 2, 3: kernel**3}[degree]
 
 
-def ridge(kernel, y, weights, alpha, of_test):
-    """Weighted ridge regression with a constant that is not penalized, by its saddle point."""
+def ridge(kernel, y, weights, alpha, kernel_of_test):
+    """Predict by weighted ridge regression whose constant is not penalized, from its equations."""
     n = len(y)
     system = np.zeros((n + 1, n + 1))
     system[:n, :n] = kernel + alpha * np.diag(1 / weights)
     system[:n, n] = system[n, :n] = 1
     solution = np.linalg.solve(system, np.append(y, 0))
-    return of_test @ solution[:n] + solution[n]
+    return kernel_of_test @ solution[:n] + solution[n]
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3])
@@ -55,8 +53,8 @@ def test_predictions_solve_the_weighted_normal_equations(degree):
     weights = RANDOM.uniform(0.2, 3, len(X))
     model = SDNNKernelRidge(alpha=0.3, degree=degree).fit(X, Y, weights)
     fresh = RANDOM.uniform(0, 1, (20, 4)).clip(X.min(axis=0), X.max(axis=0))
-    wanted = ridge(kernels(degree), Y, weights, 0.3, kernels(degree, fresh))
-    np.testing.assert_allclose(model.predict(fresh), wanted)
+    expected = ridge(kernel_matrix(degree), Y, weights, 0.3, kernel_matrix(degree, fresh))
+    np.testing.assert_allclose(model.predict(fresh), expected)
     assert (model.alpha_, model.degree_) == (0.3, degree)
 
 
@@ -64,11 +62,13 @@ def test_alpha_and_degree_minimize_the_leave_one_out_error():
     noisy = Y + np.random.RandomState(1).normal(0, 0.3, len(Y))
 
     def error(degree, alpha):
-        kernel, ones, errors = kernels(degree), np.ones(len(Y) - 1), []
+        kernel, ones, errors = kernel_matrix(degree), np.ones(len(Y) - 1), []
         for i in range(len(Y)):
-            rest = np.arange(len(Y)) != i
-            out = ridge(kernel[np.ix_(rest, rest)], noisy[rest], ones, alpha, kernel[i, rest])
-            errors.append(out - noisy[i])
+            others = np.arange(len(Y)) != i
+            of_others = kernel[np.ix_(others, others)]
+            errors.append(
+                ridge(of_others, noisy[others], ones, alpha, kernel[i, others]) - noisy[i]
+            )
         return np.mean(np.square(errors)) / noisy.var()
 
     chosen = SDNNKernelRidge().fit(X, noisy)
@@ -85,22 +85,18 @@ def test_integer_weights_equal_repeated_samples(estimator):
     weights = RANDOM.randint(0, 4, len(X))
     weighted = estimator().fit(X, y, weights)
     repeated = estimator().fit(np.repeat(X, weights, axis=0), np.repeat(y, weights))
-    outputs = (
-        model.predict if estimator is SDNNKernelRidge else model.predict_proba
-        for model in (weighted, repeated)
-    )
-    np.testing.assert_allclose(*(predict(X) for predict in outputs), atol=1e-8)
+    method = "predict" if estimator is SDNNKernelRidge else "predict_proba"
+    outputs = (getattr(model, method)(X) for model in (weighted, repeated))
+    np.testing.assert_allclose(*outputs, atol=1e-8)
 
 
 @pytest.mark.parametrize("estimator", [SDNNKernelRidge, SDNNKernelClassifier])
 def test_the_scale_of_sample_weights_has_no_effect(estimator):
     y = Y if estimator is SDNNKernelRidge else LABELS
     weights = RANDOM.uniform(0, 1, len(X))
-    small, sums_to_one = (
-        estimator().fit(X, y, weights),
-        estimator().fit(X, y, weights / weights.sum()),
-    )
-    np.testing.assert_allclose(small.dual_coef_, sums_to_one.dual_coef_, rtol=1e-6, atol=1e-8)
+    plain = estimator().fit(X, y, weights)
+    scaled = estimator().fit(X, y, weights / weights.sum())
+    np.testing.assert_allclose(plain.dual_coef_, scaled.dual_coef_, rtol=1e-6, atol=1e-8)
 
 
 def test_low_rank_fits_are_close_to_exact_ones():
@@ -183,7 +179,8 @@ def test_predictions_are_sums_of_the_analytic_kernel(pairs):
     frame = pd.DataFrame({"x": X[:, 0], "angle": 360 * X[:, 1], "kind": LABELS, "gaps": X[:, 3]})
     frame.loc[::7, "gaps"] = np.nan
     codings = [(Circular(period=360.0), ["angle"]), ("symbolic", ["kind"])]
-    codings.append((RandomInverse(length_scale=0.001), ["x"]))  # powers below the smallest number
+    # The powers of correlations of such a short scale are below the smallest number.
+    codings.append((RandomInverse(length_scale=0.001), ["x"]))
     for coding in codings, codings[:2]:
         model = SDNNKernelRidge(coding, pairs=pairs, inputs="all", degree=2, alpha=0.01)
         model.fit(frame[:90], Y[:90])
@@ -214,8 +211,8 @@ def test_several_outputs_are_predicted_like_single_ones_also_after_pickling():
     outputs = np.stack([Y, -Y], axis=1)
     both = SDNNKernelRidge().fit(X, outputs)
     np.testing.assert_allclose(both.predict(X)[:, 0], SDNNKernelRidge().fit(X, Y).predict(X))
-    same = pickle.loads(pickle.dumps(both))
-    np.testing.assert_array_equal(same.predict(X), both.predict(X))
+    unpickled = pickle.loads(pickle.dumps(both))
+    np.testing.assert_array_equal(unpickled.predict(X), both.predict(X))
     assert clone(both).get_params() == both.get_params()
 
 
@@ -244,7 +241,7 @@ def test_memory_does_not_grow_with_the_features(pairs):
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    # The documented bytes for pairs of samples, and three matrices of bins.
+    # The 48 bytes that are documented for each pair of samples, and three matrices of bins.
     assert peak < 48 * n_samples**2 + 3 * 8 * n_bins**2
 
 

@@ -15,6 +15,7 @@ OPTIONS = {"n_pattern_units": 64, "random_state": 0, "max_iter": 6}
 
 @pytest.fixture
 def few_are_many(monkeypatch):
+    """Treat samples of 1,000 and more as large; there are 1,300."""
     for module in (base, training):
         monkeypatch.setattr(module, "LARGE_SAMPLE", 1000)
 
@@ -52,8 +53,8 @@ def test_samples_sorted_by_target_are_learned():
 
 @pytest.mark.usefixtures("few_are_many")
 def test_early_stopping_and_sample_weights_work_with_blocks():
-    held = SDNNRegressor(early_stopping=True, refit=True, **OPTIONS).fit(X, Y)
-    assert held.score(X, Y) > 0.95
+    stopped = SDNNRegressor(early_stopping=True, refit=True, **OPTIONS).fit(X, Y)
+    assert stopped.score(X, Y) > 0.95
     twice = SDNNRegressor(**OPTIONS).fit(X, Y, np.full(len(X), 2.0))  # samples are shuffled
     assert twice.score(X, Y) > 0.95
 
@@ -64,14 +65,14 @@ def test_a_part_of_many_samples_selects_the_features(make):
     useless = np.random.RandomState(1).uniform(size=(len(X), 9))
     samples = np.column_stack([useless, X])
     y = Y if make is SDNNRegressor else np.median(Y) < Y
-    options = {**OPTIONS, "n_pattern_units": None}
+    options = {**OPTIONS, "n_pattern_units": None}  # chosen by the size of the sample
     model = make(**options).fit(samples, y)
     # The useful features are the last; halving 12 features leaves 6 of them, with 30 pairs.
     assert {9, 10} <= {feature for pair in model.pairs_ for feature in pair}
     assert len(model.pairs_) <= 6 * 5
-    every = make(**options, pairs="all").fit(samples, y)
-    assert len(every.pairs_) == 12 * 11
-    assert model.score(samples, y) > every.score(samples, y) - 0.02
+    with_all = make(**options, pairs="all").fit(samples, y)
+    assert len(with_all.pairs_) == 12 * 11
+    assert model.score(samples, y) > with_all.score(samples, y) - 0.02
     few = make(**options).fit(samples[:1000], y[:1000])
     assert len(few.pairs_) == 12 * 11, "few samples select no features"
 
@@ -87,6 +88,7 @@ def test_an_outlier_is_warned_of_once():
 
 @pytest.mark.parametrize("options", [{"early_stopping": True, "refit": True}, {"calibrate": True}])
 def test_networks_that_learn_with_fewer_samples_are_corrected_by_half_too(options, monkeypatch):
+    # Early stopping and calibration hold out samples: the others are fewer than the limit.
     half = SDNNRegressor(**OPTIONS, **options, correction_share=0.5).fit(X, Y)
     monkeypatch.setattr(SDNNRegressor, "_largest_full_sample", len(X) - 1)
     beyond = SDNNRegressor(**OPTIONS, **options).fit(X, Y)
@@ -96,7 +98,7 @@ def test_networks_that_learn_with_fewer_samples_are_corrected_by_half_too(option
         np.testing.assert_array_equal(beyond.predict_interval(X[:5]), expected)
 
 
-def test_very_many_samples_are_corrected_by_half(monkeypatch):
+def test_samples_beyond_the_largest_full_sample_have_half_the_share_of_corrections(monkeypatch):
     half = SDNNRegressor(**OPTIONS, correction_share=0.5).fit(X, Y)
     monkeypatch.setattr(SDNNRegressor, "_largest_full_sample", len(X))
     at_limit = SDNNRegressor(**OPTIONS).fit(X, Y)
@@ -107,11 +109,12 @@ def test_very_many_samples_are_corrected_by_half(monkeypatch):
 
 
 def test_blocks_in_any_order_have_the_bits_of_single_samples():
-    code = SDNNRegressor(RandomInverse(low=0, high=1), **{**OPTIONS, "max_iter": 1})
-    network = code.fit(X, Y).network_
+    model = SDNNRegressor(RandomInverse(low=0, high=1), **{**OPTIONS, "max_iter": 1})
+    network = model.fit(X, Y).network_
     bins = network.input_code.bins(X)
-    targets = code._counts_of_targets(Y[:, None])
+    targets = model._counts_of_targets(Y[:, None])
     blocks = np.split(np.arange(len(X), dtype=np.int32), [512, 1024])  # of 512, but for the last
+    # Whole blocks in another order, and repeated or incomplete ones.
     orders = [
         np.concatenate([blocks[1], blocks[2], blocks[0]]),
         np.concatenate([blocks[2], blocks[2], blocks[0][:-1], blocks[1], blocks[0][1:]]),

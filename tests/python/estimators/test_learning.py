@@ -61,9 +61,9 @@ def test_partial_fit_in_any_portions_equals_one_epoch_of_fit(portions, regressio
         for a, b in itertools.pairwise(bounds):
             parts.partial_fit(X[a:b], Y[a:b])
     else:
-        y = LABELS[:n].copy()
-        y[: min(3, n)] = [0, 1, 2][: min(3, n)]
         classes = np.arange(3)
+        y = LABELS[:n].copy()
+        y[:3] = classes[:n]  # `fit` needs a sample of each class
         whole = SDNNClassifier(**SETTINGS).partial_fit(X[:n], y, classes=classes)
         if n >= 3:
             assert_equal_weights(
@@ -99,7 +99,7 @@ def test_a_warm_start_of_3_after_2_epochs_equals_5_epochs(estimator, options, ta
     first, weights = model.network_, model.weights_
     assert model.set_params(max_iter=3).fit(X, targets).n_iter_ == 3
     assert_equal_weights(model, estimator(**options, shuffle=False, max_iter=5).fit(X, targets))
-    np.testing.assert_array_equal(first.layer.weights, weights)
+    np.testing.assert_array_equal(first.layer.weights, weights, "the first network was changed")
 
 
 @both_estimators
@@ -121,17 +121,15 @@ def test_a_warm_start_refuses_other_features_outputs_and_classes():
 
 
 def test_multi_output_classification_is_learned():
-    both = np.column_stack([LABELS, (X[:, 0] > 0.5).astype(int)])
-    model = MultiOutputClassifier(SDNNClassifier(**SETTINGS, max_iter=50)).fit(X, both)
-    assert (model.predict(X) == both).mean() > 0.95
+    labels = np.column_stack([LABELS, (X[:, 0] > 0.5).astype(int)])
+    model = MultiOutputClassifier(SDNNClassifier(**SETTINGS, max_iter=50)).fit(X, labels)
+    assert (model.predict(X) == labels).mean() > 0.95
 
 
 def test_partial_fit_refuses_unknown_ranges_classes_and_outputs():
     refuses("minimum", SDNNRegressor(coding=UNIT).partial_fit, X[:1], Y[:1])
     model = SDNNClassifier(**SETTINGS)
     refuses("classes", model.partial_fit, X, LABELS)
-    refuses("classes", model.partial_fit, X, LABELS, classes=[0, 1])
-    model = SDNNClassifier(**SETTINGS)
     refuses("classes", model.partial_fit, X, LABELS, classes=[0, 1])
     assert not hasattr(model, "network_"), "a refused first call leaves nothing behind"
     model.partial_fit(X, LABELS, classes=[0, 1, 2])
@@ -189,8 +187,8 @@ def test_early_stopping_restores_the_weights_of_the_best_epoch(estimator):
     model.fit(X, targets)
     best = int(np.argmax(model.validation_scores_))
     assert model.n_iter_ == len(model.validation_scores_) <= 60
-    again = estimator(**options, early_stopping=True, n_iter_no_change=4, max_iter=best + 1)
-    assert_equal_weights(model, again.fit(X, targets))
+    up_to_best = estimator(**options, early_stopping=True, n_iter_no_change=4, max_iter=best + 1)
+    assert_equal_weights(model, up_to_best.fit(X, targets))
     refuses("early", estimator(early_stopping=True, validation_fraction=0.9).fit, X[:2], [0, 1])
 
 
@@ -269,12 +267,12 @@ def test_class_weights_are_numbers_of_presentations():
     rare = (Y > 0.6).astype(int)
     assert 0 < rare.sum() < 20
     options = {**SETTINGS, "shuffle": False, "max_iter": 4}
-    weighted = SDNNClassifier(**options, class_weight={0: 1, 1: 3}).fit(X, rare)  # 1 or 3 times
-    by_hand = SDNNClassifier(**options)
-    by_hand.partial_fit(np.repeat(X, 1 + 2 * rare, axis=0), np.repeat(rare, 1 + 2 * rare), [0, 1])
-    for _ in range(weighted.n_iter_ - 1):
-        by_hand.partial_fit(np.repeat(X, 1 + 2 * rare, axis=0), np.repeat(rare, 1 + 2 * rare))
-    assert_equal_weights(weighted, by_hand)
+    weighted = SDNNClassifier(**options, class_weight={0: 1, 1: 3}).fit(X, rare)
+    repeated = SDNNClassifier(**options)
+    n_times = np.where(rare == 1, 3, 1)
+    for _ in range(weighted.n_iter_):
+        repeated.partial_fit(np.repeat(X, n_times, axis=0), np.repeat(rare, n_times), [0, 1])
+    assert_equal_weights(weighted, repeated)
 
 
 def test_balanced_class_weights_predict_the_rare_class_more_often():
@@ -327,17 +325,18 @@ def test_adaboost_boosts_classifiers_by_sample_weights():
 def test_sample_and_class_weights_are_multiplied():
     options = {**SETTINGS, "max_iter": 4}
     labels = (Y > 0).astype(int)
-    both = SDNNClassifier(**options, class_weight={0: 2, 1: 1}).fit(X, labels, np.full(len(Y), 0.5))
+    model = SDNNClassifier(**options, class_weight={0: 2, 1: 1})
+    model.fit(X, labels, sample_weight=np.full(len(Y), 0.5))
     products = np.where(labels == 0, 2 * 0.5, 1 * 0.5)
-    assert_equal_weights(both, SDNNClassifier(**options).fit(X, labels, products))
+    assert_equal_weights(model, SDNNClassifier(**options).fit(X, labels, products))
 
 
 def test_sample_weights_apply_to_early_stopping_and_selection_of_pairs():
-    weights = np.where(X[:, 0] > 0.5, 1.0, 1e-3)
-    wrong = np.where(X[:, 0] > 0.5, Y, 5.0)
+    is_heavy = X[:, 0] > 0.5
+    weights = np.where(is_heavy, 1.0, 1e-3)
+    wrong = np.where(is_heavy, Y, 5.0)  # targets of small weight are wrong
     options = {**SETTINGS, "early_stopping": True, "max_iter": 20, "n_iter_no_change": 20}
     refitted = SDNNRegressor(**options, refit=True).fit(X, wrong, weights)
-    is_heavy = X[:, 0] > 0.5
     assert refitted.score(X[is_heavy], Y[is_heavy]) > 0.9 > refitted.score(X, wrong)
     selected = SDNNRegressor(**SETTINGS, pairs="auto", max_iter=3).fit(X, wrong, weights)
     assert set(selected.pairs_) == {(0, 1), (1, 0)}
@@ -358,15 +357,16 @@ def test_invalid_sample_weights_are_refused(make, bad):
 
 
 def test_sample_weights_with_too_many_presentations_are_refused():
-    refuses("sample_weight", sample_weights, np.full(1000, 1e6), 1000)
+    n_samples = 1000  # a billion presentations in an epoch
+    refuses("sample_weight", sample_weights, np.full(n_samples, 1e6), n_samples)
 
 
 def test_training_with_fractional_weights_ends_after_epochs_without_corrections():
     easy = (X[:, 0] > 0.5).astype(int)
-    model = SDNNClassifier(**SETTINGS, n_units_per_class=1, class_weight={0: 0.25, 1: 1}).fit(
-        X, easy
-    )
+    model = SDNNClassifier(**SETTINGS, n_units_per_class=1, class_weight={0: 0.25, 1: 1})
+    model.fit(X, easy)
     assert model.n_iter_ < 100
+    # A sample of weight 0.25 is presented in every fourth epoch: all are right after four.
     assert model.n_corrected_[-4:].tolist() == [0, 0, 0, 0]
     assert model.score(X, easy) == 1
 
@@ -375,13 +375,13 @@ def test_predictions_average_the_networks_of_three_epochs(tmp_path):
     noisy = Y + np.random.RandomState(1).normal(0, 0.5, len(Y))
     options = {**REGRESSOR, "shuffle": False, "output_range": (-3, 3)}
     model = SDNNRegressor(**options, max_iter=11, n_averaged_epochs=3).fit(X, noisy)
-    answers = [
+    predictions = [
         SDNNRegressor(**options, max_iter=n, n_averaged_epochs=1).fit(X, noisy).predict(X)
         for n in (6, 9, 11)  # the last epoch, and each third one before
     ]
     means, spread = model.predict(X, return_std=True)
-    np.testing.assert_allclose(means, np.mean(answers, axis=0), atol=1e-12)
-    np.testing.assert_allclose(spread, np.std(answers, axis=0), atol=1e-12)
+    np.testing.assert_allclose(means, np.mean(predictions, axis=0), atol=1e-12)
+    np.testing.assert_allclose(spread, np.std(predictions, axis=0), atol=1e-12)
     assert spread.max() > 0
     assert model.predict_one(X[3]) == means[3]
     # A saved model keeps the networks; online learning continues with the last one.
@@ -397,7 +397,7 @@ def test_predictions_average_the_networks_of_three_epochs(tmp_path):
 def test_averaged_networks_count_towards_the_memory_limit():
     unaveraged = {**REGRESSOR, "output_range": (-3, 3)}
     model = SDNNRegressor(**unaveraged, max_iter=2).fit(X, Y)
-    weights = 4 * model.weights_.size
+    weight_bytes = 4 * model.weights_.size
     table_bytes = code_bytes(model.codings_, model.pairs_, model.network_.input_code.core.n_units)
     options = {**unaveraged, "n_averaged_epochs": 5}
     # Every third epoch is averaged: the last of 16 and four before it, of 9 only two. Early
@@ -408,12 +408,12 @@ def test_averaged_networks_count_towards_the_memory_limit():
         ({"max_iter": 16, "early_stopping": True}, 9),
         ({"max_iter": 16, "early_stopping": True, "refit": True}, 5),
     ]:
-        limit = n_networks * weights + table_bytes
+        limit = n_networks * weight_bytes + table_bytes
         SDNNRegressor(**options, **changes, training="plain", memory_limit=limit).fit(X, Y)
         model = SDNNRegressor(**options, **changes, training="plain", memory_limit=limit - 1)
         with pytest.raises(ValueError, match=f"{n_networks} networks"):
             model.fit(X, Y)
-        model.partial_fit(X, Y).learn_one(X[0], Y[0])  # which average nothing
+        model.partial_fit(X, Y).learn_one(X[0], Y[0])  # online learning averages no networks
     model.set_params(warm_start=True, refit=False, early_stopping=False)
     with pytest.raises(ValueError, match="5 networks"):
         model.fit(X, Y)
@@ -437,8 +437,8 @@ def test_early_stopping_keeps_the_averages_of_its_best_epochs():
     options |= {"early_stopping": True, "n_iter_no_change": 4, "n_averaged_epochs": 3}
     model = SDNNRegressor(**options, max_iter=60).fit(X, noisy)
     best = int(np.argmax(model.validation_scores_))
-    again = SDNNRegressor(**options, max_iter=best + 1).fit(X, noisy)
-    np.testing.assert_array_equal(model.predict(X), again.predict(X))
+    up_to_best = SDNNRegressor(**options, max_iter=best + 1).fit(X, noisy)
+    np.testing.assert_array_equal(model.predict(X), up_to_best.predict(X))
 
 
 def test_refit_trains_on_all_samples_for_the_best_number_of_epochs():

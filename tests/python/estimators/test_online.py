@@ -59,10 +59,10 @@ def test_learn_one_and_predict_one_have_the_bits_of_partial_fit_and_predict(name
     assert isinstance(singly[0], float)
 
 
-PREDICTING = [regressor, classifier, lambda: classifier(scheme="one_vs_one")]
+MODELS = [regressor, classifier, lambda: classifier(scheme="one_vs_one")]
 
 
-@pytest.mark.parametrize("make", PREDICTING, ids=["regressor", "classifier", "one_vs_one"])
+@pytest.mark.parametrize("make", MODELS, ids=["regressor", "classifier", "one_vs_one"])
 def test_predictions_do_not_depend_on_the_number_of_rows(make):
     model = make().fit(X, LABELS // 2)
     expected = model.predict(X)
@@ -99,6 +99,7 @@ def test_fit_widens_the_output_range_before_training_and_partial_fit_during_it()
 
 
 def test_portions_of_any_size_have_the_bits_of_plain_training():
+    # More than FEW_SAMPLES are learned in another way than fewer.
     model, plain = regressor(), regressor(training="plain")
     portions = [1, FEW_SAMPLES + 5, 3, 1, FEW_SAMPLES, 40]
     begin = 0
@@ -121,13 +122,13 @@ def test_concurrent_predictions_equal_sequential_ones(make, learns):
     else:
         model.predict_one(X[0])
     expected = copy.deepcopy(model).predict(X).tolist()
-    works = [
+    comparisons = [
         lambda: model.predict(X).tolist() == expected,
         lambda: model.predict(X[:9]).tolist() == expected[:9],
         lambda: model.predict_one(X[5]) == expected[5],
     ]
     with ThreadPoolExecutor(4) as pool:
-        outcomes = [pool.submit(works[number % 3]) for number in range(300)]
+        outcomes = [pool.submit(comparisons[number % 3]) for number in range(300)]
         assert all(outcome.result() for outcome in outcomes)
 
 
@@ -140,6 +141,7 @@ def test_features_that_may_be_missing_may_be_left_out():
     assert model.predict_one(lacking) == model.predict_one(rows[3])
     copied = copy.deepcopy(model)
     assert_equal_weights(model.learn_one(lacking, 0.5), copied.learn_one(rows[3], 0.5))
+    # Refused, with the names that are expected: an unknown feature, and missing numbers.
     for bad in ({**lacking, "e": 1.0}, {"b": 0.5, "word": "u"}, {**lacking, "word": "u", "e": 1.0}):
         refuses("word", model.predict_one, bad)
 
@@ -173,7 +175,7 @@ def test_learn_one_and_predict_one_accept_several_outputs():
     refuses("outputs", model.learn_one, X[0], 0.5)
 
 
-def test_weights_beyond_16_bits_are_learned_online():
+def test_weights_that_do_not_fit_into_bytes_are_learned_online():
     model = regressor().fit(X, Y)
     network = model.network_ = Network(
         model.network_.input_code,
@@ -181,9 +183,9 @@ def test_weights_beyond_16_bits_are_learned_online():
         weights=np.full_like(model.weights_, 20_000),
         thresholds=model.thresholds_,
     )
-    other = pickle.loads(pickle.dumps(model)).set_params(training="plain")
-    assert_equal_weights(model.learn_one(X[0], Y[0]), other.partial_fit(X[:1], Y[:1]))
-    assert network.online(2**30) is None
+    plain = pickle.loads(pickle.dumps(model)).set_params(training="plain")
+    assert_equal_weights(model.learn_one(X[0], Y[0]), plain.partial_fit(X[:1], Y[:1]))
+    assert network.online(2**30) is None, "a copy in bytes, for which there would be memory"
 
 
 @pytest.mark.parametrize(
@@ -209,8 +211,8 @@ def test_values_outside_a_range_are_counted_and_warned_about_once():
         model.learn_one(X[0] + np.array([0, 0, 9, 0]), 0.0)
     with pytest.warns(OutOfRangeWarning, match="output_range_"):
         model.partial_fit(X[:3] + 7, [9.0, 9.0, 0.0])
-    model.learn_one(X[0] + 5, 9.0)
-    assert model.n_inputs_out_of_range_ == 1 + 3 * 4 + 4  # of one column, three rows, and a row
+    model.learn_one(X[0] + 5, 9.0)  # an error if it warned again
+    assert model.n_inputs_out_of_range_ == 1 + 3 * 4 + 4  # one value, three rows, and a row of four
     assert model.n_outputs_out_of_range_ == 2 + 1
     model.predict(X + 5)
     assert model.n_inputs_out_of_range_ == 1 + 3 * 4 + 4, "predictions are not counted"
@@ -248,6 +250,7 @@ def test_fit_counts_and_warns_about_values_that_widen_a_range():
     assert len(caught) == 1
     assert caught[0].filename == __file__
     assert model.n_outputs_out_of_range_ == beyond > 0
+    # From -1.5 to 1.5, the range is widened by a share of its new width, first at its low end.
     low = 9 * Y.min() - MARGIN * (1.5 - 9 * Y.min())
     high = 9 * Y.max() + MARGIN * (9 * Y.max() - low)
     np.testing.assert_allclose(model.output_range_[0], [low, high])
@@ -290,11 +293,11 @@ def test_river_estimators_learn_numbers_and_labels(river):
     labelled = river.RiverClassifier(SDNNClassifier(**OPTIONS), grace_period=50)
     assert labelled.predict_one(ROWS[0]) is None
     for _ in range(5):
-        hits = []
+        is_right = []
         for row, label in zip(ROWS, LABELS.tolist(), strict=True):
-            hits.append(labelled.predict_one(row) == label)
+            is_right.append(labelled.predict_one(row) == label)
             labelled.learn_one(row, label)
-    assert np.mean(hits) > 0.8
+    assert np.mean(is_right) > 0.8, "in the last of five passes"
     assert labelled.clone().fitted is None
 
 
@@ -353,7 +356,7 @@ def test_rivers_estimator_checks_pass(river, number):
 
 
 def late_stream(n_samples):
-    """Numbers, of which one may be missing, words, and from sample 400 on more of both."""
+    """Yield samples with numbers and a word; from the 400th on, a new feature and a new word."""
     random = np.random.RandomState(3)
     for number in range(n_samples):
         a, b, late = random.uniform(size=3).tolist()
@@ -364,7 +367,7 @@ def late_stream(n_samples):
 
 
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
-@pytest.mark.parametrize("n_pattern_units", [40, None, 2000])  # the last begins anew
+@pytest.mark.parametrize("n_pattern_units", [40, None, 2000])  # 2000: too large to be extended
 def test_river_features_and_categories_may_appear_late(river, n_pattern_units):
     ordered, reordered = (river_models(river)[0] for _ in range(2))
     errors = []
@@ -394,10 +397,10 @@ def test_adding_inputs_keeps_predictions_and_can_be_saved(river, tmp_path):
     before = [model.fitted.predict_one(x) for x in rows]
     names = model.fitted.feature_names_in_.tolist()
     words = model.fitted.codings_[names.index("word")]
-    more = WithMissing(base=Symbolic(categories=(*words.base.categories, "w")))
-    new = {"new": WithMissing(base=UNIT).fit(X[:, 0], 40)}
-    assert not grow(model.fitted, new, {names.index("word"): more}, 100)
-    assert grow(model.fitted, new, {names.index("word"): more}, 2**20)
+    more_words = WithMissing(base=Symbolic(categories=(*words.base.categories, "w")))
+    changes = {"new": WithMissing(base=UNIT).fit(X[:, 0], 40)}, {names.index("word"): more_words}
+    assert not grow(model.fitted, *changes, most_columns=100)
+    assert grow(model.fitted, *changes, most_columns=2**20)
     assert [model.fitted.predict_one(x) for x in rows] == before
     model.fitted.learn_one({"new": 0.5, "word": "w"}, 0.5)
     model.fitted.save(tmp_path / "grown.safetensors")
@@ -437,8 +440,8 @@ def test_river_classes_may_appear_late(river):
             model.learn_one(ROWS[row], names[row])
         order = np.random.RandomState(0).permutation(len(order))
     assert model.fitted.classes_.tolist()[-1] == "high"
-    hits = [model.predict_one(row) == name for row, name in zip(ROWS, names, strict=True)]
-    assert np.mean(hits) > 0.8
+    is_right = [model.predict_one(row) == name for row, name in zip(ROWS, names, strict=True)]
+    assert np.mean(is_right) > 0.8
     assert set(model.predict_proba_one(ROWS[0])) == {"low", "middle", "high"}
     for label in (3, 2.5, None):
         refuses("y", model.learn_one, ROWS[0], label)
@@ -476,7 +479,7 @@ def test_before_fitting_river_probabilities_are_frequencies_of_labels(river):
     for row, label in zip(ROWS, ["red", "green", "red", "red"], strict=False):
         model.learn_one(row, label)
     assert model.predict_proba_one(ROWS[0]) == {"red": 0.75, "green": 0.25}
-    assert ensemble.VotingClassifier([model, model])._multiclass  # not for two classes alone
+    assert ensemble.VotingClassifier([model, model])._multiclass, "more than two classes"
     single = river.RiverClassifier(SDNNClassifier(**OPTIONS, scheme="one_vs_one"))
     refuses("scheme", single.predict_proba_one, ROWS[0], error=NotImplementedError)
 
@@ -503,16 +506,13 @@ def test_river_metrics_and_multiclass_wrappers_accept_the_classifier(river):
 @pytest.mark.parametrize("size", [1, 7, 200])
 def test_fractional_sample_weights_are_presentations_in_any_portions(size):
     weights = np.tile([2.0, 0.5, 1.0, 0.25], 50)
-    model, times = regressor(), samples_of_epoch(200, weights, 0)
+    model, presented = regressor(), samples_of_epoch(200, weights, epoch=0)  # indices of samples
     for begin in range(0, 200, size):
-        part = slice(begin, begin + size)
-        model.partial_fit(X[part], Y[part], sample_weight=weights[part])
-    repeated = regressor().partial_fit(X[times], Y[times])
+        portion = slice(begin, begin + size)
+        model.partial_fit(X[portion], Y[portion], sample_weight=weights[portion])
+    repeated = regressor().partial_fit(X[presented], Y[presented])
     np.testing.assert_array_equal(model.weights_, repeated.weights_)
-    assert len(times) == pytest.approx(weights.sum(), abs=2)
+    assert len(presented) == pytest.approx(weights.sum(), abs=2)
     halves = classifier().partial_fit(X, LABELS, [0, 1, 2], np.full(200, 0.5))
-    assert (
-        0
-        < np.abs(halves.weights_).sum()
-        < np.abs(classifier().partial_fit(X, LABELS, [0, 1, 2]).weights_).sum()
-    )
+    whole = classifier().partial_fit(X, LABELS, [0, 1, 2])
+    assert 0 < np.abs(halves.weights_).sum() < np.abs(whole.weights_).sum()

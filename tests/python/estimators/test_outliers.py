@@ -30,25 +30,25 @@ def network(**options):
     return SDNNRegressor(n_pattern_units=100, max_iter=15, random_state=0, **options)
 
 
-def problem(random, n=N):
+def samples(random, n=N):
     X = random.uniform(-1, 1, (n, 3)) if random.randint(2) else random.normal(size=(n, 3))
     return X, np.sin(2 * X[:, 0]) + X[:, 1]
 
 
 def with_outlier(random, X, y):
-    """Return the samples with a value, a row or a target that is far from all others."""
+    """Return the samples with a target, a value or a row that is far from all others."""
     X, y = X.copy(), y.copy()
     row, far = random.randint(len(y)), 10 ** random.uniform(0.7, 6) * random.choice([-1, 1])
-    where = random.randint(3)
-    if where == 0:
+    outlier = ["target", "value", "row"][random.randint(3)]
+    if outlier == "target":
         y[row] = far * np.ptp(y)
     else:
-        X[row, : where**2] = far * np.ptp(X)
+        X[row, : 1 if outlier == "value" else 3] = far * np.ptp(X)
     return X, y
 
 
-def fit(model, X, y):
-    """The fitted model, and whether it warned of outliers."""
+def fit_and_watch(model, X, y):
+    """Return the fitted model, and whether it warned of outliers."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         model.fit(X, y)
@@ -58,14 +58,14 @@ def fit(model, X, y):
 @pytest.mark.parametrize("seed", range(100))
 def test_an_outlier_causes_a_warning_or_a_loss_below_002(seed):
     random = np.random.RandomState(seed)
-    (X, y), (X_test, y_test) = problem(random), problem(np.random.RandomState(seed), 400)
+    (X, y), (X_test, y_test) = samples(random), samples(np.random.RandomState(seed), 400)
     make = network if seed % 2 else SDNNKernelRidge
-    clean, warned = fit(make(), X, y)
+    clean, warned = fit_and_watch(make(), X, y)
     assert not warned
-    spoiled, warned = fit(make(), *with_outlier(random, X, y))
+    spoiled, warned = fit_and_watch(make(), *with_outlier(random, X, y))
     lost = clean.score(X_test, y_test) - spoiled.score(X_test, y_test)
     assert warned or lost < 0.02
-    robust, warned = fit(make(ranges="robust"), *with_outlier(random, X, y))
+    robust, warned = fit_and_watch(make(ranges="robust"), *with_outlier(random, X, y))
     assert not warned
     assert clean.score(X_test, y_test) - robust.score(X_test, y_test) < 0.1
 
@@ -73,21 +73,22 @@ def test_an_outlier_causes_a_warning_or_a_loss_below_002(seed):
 @pytest.mark.parametrize("seed", range(100))
 def test_samples_of_usual_distributions_cause_no_warning_until_one_is_distant(seed):
     random = np.random.RandomState(seed)
-    X = np.stack([make(random) for make in CLEAN], axis=1)[:, random.permutation(len(CLEAN))[:4]]
+    columns = np.stack([draw(random) for draw in CLEAN], axis=1)  # of each distribution
+    X = columns[:, random.permutation(len(CLEAN))[:4]]
     y = CLEAN[seed % len(CLEAN)](random)
     options = {"n_pattern_units": 16, "max_iter": 1, "random_state": 0}
     for model in (SDNNRegressor(**options), SDNNKernelRidge(degree=1)):
-        assert not fit(model, X, y)[1]
+        assert not fit_and_watch(model, X, y)[1]
     labels = X[:, 0] > np.quantile(X[:, 0], 0.4)
     labels[:2] = True, False
     for model in (SDNNClassifier(**options), SDNNKernelClassifier(degree=1)):
-        assert not fit(model, X, labels)[1]
-        assert fit(model, np.vstack([X[1:], X[:1] + 1e4]), labels)[1]
+        assert not fit_and_watch(model, X, labels)[1]
+        assert fit_and_watch(model, np.vstack([X[1:], X[:1] + 1e4]), labels)[1]
 
 
 def test_robust_ranges_of_clean_samples_equal_full_ranges():
     random = np.random.RandomState(0)
-    X, y = problem(random)
+    X, y = samples(random)
     for make in (network, SDNNKernelRidge):
         plain, robust = make().fit(X, y), make(ranges="robust").fit(X, y)
         np.testing.assert_array_equal(plain.predict(X), robust.predict(X))
@@ -119,11 +120,11 @@ def test_usual_range_excludes_few_distant_values():
 def test_only_codings_that_fit_evenly_spaced_bins_warn_of_outliers(coding, warns):
     X = np.arange(100.0)[:, None] / 100
     X[7] = 1e6
-    assert fit(network(coding=coding), X, np.arange(100.0))[1] == warns
+    assert fit_and_watch(network(coding=coding), X, np.arange(100.0))[1] == warns
 
 
 def test_partial_fit_warns_of_outliers_in_its_first_samples():
-    X, y = problem(np.random.RandomState(0))
+    X, y = samples(np.random.RandomState(0))
     y[3] = 1e6
     with pytest.warns(OutlierWarning, match="ranges='all'") as caught:
         network().partial_fit(X, y)
@@ -132,7 +133,7 @@ def test_partial_fit_warns_of_outliers_in_its_first_samples():
 
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
 def test_a_widened_output_range_ignores_one_outlier_but_follows_many():
-    X, y = problem(np.random.RandomState(0), 1000)
+    X, y = samples(np.random.RandomState(0), 1000)
     model = network(out_of_range="widen").partial_fit(X[:100], y[:100])
     width = np.ptp(model.output_range_)
     model.learn_one(X[100], 1e6)

@@ -16,10 +16,10 @@ OPTIONS = {"n_pattern_units": 60, "random_state": 0, "max_iter": 10}
 
 def test_the_only_relevant_pair_is_selected():
     options = {**OPTIONS, "n_units_per_class": 10}
-    every = SDNNClassifier(**options).fit(X[:300], XOR[:300])
+    with_all = SDNNClassifier(**options).fit(X[:300], XOR[:300])
     auto = SDNNClassifier(**options, pairs="auto").fit(X[:300], XOR[:300])
     assert set(auto.pairs_) == {(2, 5), (5, 2)}
-    assert auto.score(X[300:], XOR[300:]) > max(0.95, every.score(X[300:], XOR[300:]))
+    assert auto.score(X[300:], XOR[300:]) > max(0.95, with_all.score(X[300:], XOR[300:]))
     expected_model = SDNNClassifier(**options, pairs=[(2, 5), (5, 2)]).fit(X[:300], XOR[:300])
     np.testing.assert_array_equal(auto.weights_, expected_model.weights_)
 
@@ -32,8 +32,8 @@ def test_irrelevant_features_are_left_out():
     used_features = {feature for pair in model.pairs_ for feature in pair}
     assert {3, 17, 30} <= used_features
     assert len(used_features) <= 5, "40 features are halved to 20, 10, 5 and 3"
-    budget = SDNNRegressor(random_state=0).fit(wide[:300], y[:300])
-    assert model.score(wide[300:], y[300:]) > budget.score(wide[300:], y[300:]) + 0.1
+    by_default = SDNNRegressor(random_state=0).fit(wide[:300], y[:300])  # uses all features
+    assert model.score(wide[300:], y[300:]) > by_default.score(wide[300:], y[300:]) + 0.1
 
 
 def test_all_pairs_are_kept_if_all_are_relevant():
@@ -78,13 +78,13 @@ def test_pairs_can_be_selected_with_a_category_that_occurs_once(name):
 def test_pairs_can_be_selected_with_a_rare_class(n_rare):
     labels = np.repeat([0, 1], [40 - n_rare, n_rare])
     model = SDNNClassifier(**OPTIONS, n_units_per_class=4, pairs="auto").fit(X[:40, :3], labels)
-    assert model.pairs_  # which ones chance decides, with so few samples
+    assert model.pairs_, "with so few samples, any pairs may be selected"
 
 
 def test_a_class_that_occurs_once_is_learned_with_selected_pairs():
-    rest = XOR[:40].copy()
-    rest[0] = 2
-    model = SDNNClassifier(**OPTIONS, pairs="auto", correction_share=1.0).fit(X[:40, :3], rest)
+    labels = XOR[:40].copy()
+    labels[0] = 2
+    model = SDNNClassifier(**OPTIONS, pairs="auto", correction_share=1.0).fit(X[:40, :3], labels)
     assert model.score(X[:1, :3], [2]) == 1
 
 

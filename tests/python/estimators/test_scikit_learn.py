@@ -2,8 +2,6 @@
 
 import dataclasses
 import inspect
-import subprocess
-import sys
 
 import numpy as np
 import pandas as pd
@@ -16,6 +14,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import check_estimator
 
+from processes import python
 from refusals import refuses
 from sdnn import SDNNClassifier, SDNNKernelClassifier, SDNNKernelRidge, SDNNRegressor, _core
 from sdnn.coding import CoarseCodeWarning, RandomInverse
@@ -53,12 +52,12 @@ def targets_of(estimator):
 )
 def test_scikit_learns_check_estimator_finds_no_fault(model):
     results = check_estimator(model, on_skip=None, on_fail=None)
-    other = {r["check_name"]: r["status"] for r in results if r["status"] != "passed"}
-    # The first, of newer versions, asks for an environment variable that is read when SciPy is
+    not_passed = {r["check_name"]: r["status"] for r in results if r["status"] != "passed"}
+    # The first, of newer versions, needs an environment variable that is read when SciPy is
     # imported. The second cannot hold where the order of samples matters; scikit-learn's
     # Perceptron fails it too.
-    assert other.pop("check_array_api_input", "skipped") == "skipped"
-    assert other == {"check_sample_weight_equivalence_on_dense_data": "failed"}
+    assert not_passed.pop("check_array_api_input", "skipped") == "skipped"
+    assert not_passed == {"check_sample_weight_equivalence_on_dense_data": "failed"}
     assert len(results) > 45, "nearly all checks were run"
 
 
@@ -67,7 +66,7 @@ def test_importing_sdnn_imports_no_scikit_learn():
         "import sys, sdnn, sdnn.coding, sdnn.coding.kernel, sdnn.estimators\n"
         "assert not {'sklearn', 'joblib', 'safetensors', 'scipy', 'matplotlib'} & set(sys.modules)"
     )
-    subprocess.run([sys.executable, "-c", code], check=True)
+    python("-c", code, check=True)
 
 
 def test_a_missing_scikit_learn_is_named_with_its_installation():
@@ -76,10 +75,7 @@ def test_a_missing_scikit_learn_is_named_with_its_installation():
         "try: sdnn.SDNNRegressor\n"
         "except ImportError as error: print(error)"
     )
-    process = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    )
-    assert "pip install scikit-learn" in process.stdout
+    assert "pip install scikit-learn" in python("-c", code, check=True).stdout
 
 
 def test_sparse_samples_are_refused(estimator):
@@ -183,9 +179,8 @@ def test_parameters_are_stored_unchanged(estimator):
     }
     model = type(estimator)(**parameters)
     assert all(getattr(model, name) is value for name, value in parameters.items())
-    refuses(
-        "pairs", type(estimator)(pairs=iter([(0, 1)])).fit, X, targets_of(estimator)
-    )  # which could be read only once
+    read_once = type(estimator)(pairs=iter([(0, 1)]))
+    refuses("pairs", read_once.fit, X, targets_of(estimator))
 
 
 def test_docstrings_name_every_parameter(estimator):
