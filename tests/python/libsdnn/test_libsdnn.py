@@ -5,6 +5,7 @@ parameters and samples below; the hash is of thresholds and weights as its model
 """
 
 import hashlib
+import itertools
 import math
 from pathlib import Path
 
@@ -22,7 +23,10 @@ PARAMETERS = (FILES / "demonstration.txt").read_text()
 
 
 def demonstration_sample(n_samples, state=1):
-    """Points of the lattice outside the blanks, by a linear congruential generator."""
+    """Draw points of a lattice outside the blanks, and the function there, as LIBSDNN's demo does.
+
+    The random numbers are those of a linear congruential generator.
+    """
     points = []
     targets = []
     while len(points) < n_samples:
@@ -90,19 +94,14 @@ def test_the_two_libraries_draw_different_weights(parameter_file):
 def test_the_model_file_of_a_classifier_is_read_with_libsdnns_weights(name, expected):
     model = libsdnn.read_model_file(FILES / f"{name}.bin", "libstdc++")
     assert model.parameters.scheme == name
-    assert (
-        model.parameters.inputs
-        == (libsdnn.LibsdnnInput(symbolic=False, n_bins=51, n_flipped=3),) * 2
-    )
+    number = libsdnn.LibsdnnInput(symbolic=False, n_bins=51, n_flipped=3)
+    assert model.parameters.inputs == (number, number)
     assert model.parameters.pairs == ((0, 1), (1, 0))
     assert model.parameters.pattern_seed == (7, 8, 9)
     assert digest(model.layer).startswith(expected)
-    lattice = np.array(
-        [(x / 1000, y / 1000) for x in range(0, 1001, 25) for y in range(0, 1001, 25)]
-    )
-    predicted = model.predict(lattice)
-    truth = np.minimum((lattice[:, 0] * 2).astype(int) + 2 * (lattice[:, 1] * 2).astype(int), 3)
-    assert np.mean(predicted == truth) > 0.8
+    lattice = np.array(list(itertools.product(np.linspace(0.0, 1.0, 41), repeat=2)))
+    right, above = (lattice >= 0.5).astype(int).T
+    assert np.mean(model.predict(lattice) == right + 2 * above) > 0.8, "the classes are quadrants"
 
 
 def test_values_have_the_bins_of_libsdnn(parameter_file):
@@ -135,7 +134,7 @@ def test_values_have_the_bins_of_libsdnn(parameter_file):
         (("[-5, 5]", "[5, -5]"), "initial_value_range"),
         (("mutual", "nobody"), "combination_setting"),
         (("mutual", "file"), "filename"),
-        (("<SD>", "SD"), "19"),
+        (("<SD>", "SD"), "19"),  # the number of the line
         (("<ISSUE> % what", "}\n<ISSUE> % what"), "1"),
     ],
 )
@@ -156,11 +155,10 @@ def test_damaged_model_files_are_refused(tmp_path):
     for broken in (b"", content[:3], content[:100], content[:-1], content + b"1234"):
         path.write_bytes(broken)
         refuses("must", libsdnn.read_model_file, path)
-    path.write_bytes(content[:-8] + b"\xff\xff\xff\x7f" * 2)
+    path.write_bytes(content[:-8] + b"\xff\xff\xff\x7f" * 2)  # the largest 32-bit integers
     refuses("model.bin", libsdnn.read_model_file, path)
 
 
 def test_tables_beyond_the_memory_limit_are_refused(parameter_file):
-    """2^24 patterns an input would take half a minute and 16 GB."""
-    file = parameter_file(("1001,5", "16777216,5"))
+    file = parameter_file(("1001,5", "16777216,5"))  # patterns of an input: 16 GB
     refuses("RANDOM_INVERSE", libsdnn.read_parameter_file(file).make_layer)

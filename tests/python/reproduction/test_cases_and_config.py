@@ -1,6 +1,7 @@
 """The paper's experiments and cases, and the configurations and seeds of their trials."""
 
 import json
+import zlib
 from dataclasses import replace
 
 import numpy as np
@@ -34,7 +35,7 @@ def test_experiment_b_has_the_cases_of_the_paper():
 
 def test_the_paper_has_ninety_trials():
     cases = [case for experiment in EXPERIMENTS for case in experiment.cases]
-    plan = plan_trials(cases, 10, 0)
+    plan = plan_trials(cases, n_trials=10, root_seed=0)
     # 20 of Experiment A and 80 of Experiment B, which share the 10 of SDNN-C in Case I.
     assert len(plan) == 20 + 80 - 10
 
@@ -42,35 +43,32 @@ def test_the_paper_has_ninety_trials():
 def test_agents_of_a_case_have_the_same_seeds():
     (experiment,) = select_experiments("b")
     seeds = {}
-    for planned in plan_trials(experiment.cases, 3, 0):
+    for planned in plan_trials(experiment.cases, n_trials=3, root_seed=0):
         seeds.setdefault((planned.key.case_id, planned.key.trial), set()).add(planned.key.seed)
-    assert {len(case_seeds) for case_seeds in seeds.values()} == {1}
+    assert {len(seeds_of_agents) for seeds_of_agents in seeds.values()} == {1}
 
 
 def test_cases_with_the_same_id_have_the_same_sensors():
     sensors = {}
     for experiment in EXPERIMENTS:
         for case in experiment.cases:
-            assert sensors.setdefault(case.id, (case.n_sensors, case.noise)) == (
-                case.n_sensors,
-                case.noise,
-            )
+            of_case = case.n_sensors, case.noise
+            assert sensors.setdefault(case.id, of_case) == of_case
             assert set(case.agents) <= set(AGENTS)
 
 
 def test_presets_are_added_to_the_agents_of_a_case():
-    experiment = EXPERIMENTS[0]
-    both = experiment.with_agents([], ["robust", "paper", "robust"])
-    # The preset "paper" is the usual agent, and a preset named twice is added once.
-    assert [case.agents for case in both.cases] == 2 * [("sdnn-c", "sdnn-c-robust")]
+    with_presets = EXPERIMENTS[0].with_agents([], ["robust", "paper", "robust"])
+    # The preset "paper" is the agent of the case, and a preset named twice is added once.
+    assert [case.agents for case in with_presets.cases] == 2 * [("sdnn-c", "sdnn-c-robust")]
 
 
 def test_the_canonical_json_is_sorted_and_the_same_for_equal_numbers():
     config = paper_spec()
     text = config.canonical_json()
     assert text == json.dumps(json.loads(text), sort_keys=True, separators=(",", ":"))
-    noise_typed = [0, 0.0, -0.0, np.float64(0.0)]
-    tables = [{"kwargs": {"sensors": {"noise": noise}}} for noise in noise_typed]
+    zeros = [0, 0.0, -0.0, np.float64(0.0)]
+    tables = [{"kwargs": {"sensors": {"noise": zero}}} for zero in zeros]
     hashes = {paper_spec(environment=table).config_hash for table in tables}
     assert hashes == {config.config_hash}
 
@@ -100,36 +98,34 @@ def test_the_hash_depends_on_every_table_of_settings():
 
 def test_a_case_has_one_network_input_per_sensor():
     (experiment,) = select_experiments("a")
-    spec = case_spec(experiment.cases[1], "sdnn-c")
-    assert spec.core_settings()["approximator"].n_inputs == 6
+    case = experiment.cases[1]
+    spec = case_spec(case, "sdnn-c")
+    assert spec.core_settings()["approximator"].n_inputs == case.n_sensors == 6
     assert (spec.budget.episodes, spec.protocol.evaluate_every_episodes) == (15_000, 10)
-    refuses("'fuzzy'", case_spec, experiment.cases[1], "fuzzy")
+    refuses("'fuzzy'", case_spec, case, "fuzzy")
 
 
 def test_with_agents_replaces_only_the_agents():
     (experiment,) = select_experiments("b")
     other = experiment.with_agents(["rbf", "sdnn-c", "rbf"])
     assert {case.agents for case in other.cases} == {("rbf", "sdnn-c")}
-    assert [replace(case, agents=("sdnn-c", "fuzzy")) for case in other.cases] == list(
-        experiment.cases
-    )
+    with_agents_of_paper = [replace(case, agents=("sdnn-c", "fuzzy")) for case in other.cases]
+    assert with_agents_of_paper == list(experiment.cases)
     assert ("s4", "rbf") in other.pairs
     assert experiment.with_agents([]) == experiment
 
 
 def test_the_seed_of_a_trial_is_a_hash_of_root_seed_case_and_number():
-    # zlib.crc32(b"s4") == 0x647FCC7F
-    sequence = np.random.SeedSequence(7, spawn_key=(0x647FCC7F, 3))
+    sequence = np.random.SeedSequence(7, spawn_key=(zlib.crc32(b"s4"), 3))
     assert trial_seed(7, "s4", 3) == int(sequence.generate_state(1, np.uint64)[0]) >> 1
     seeds = {trial_seed(r, c, t) for r in (0, 1) for c in ("s4", "s6") for t in range(10)}
-    assert len(seeds) == 40
-    assert max(seeds) < 2**63
+    assert len(seeds) == 2 * 2 * 10
+    assert max(seeds) < 2**63, "SQLite stores signed integers"
 
 
 def test_a_plan_lists_shared_trials_once_and_in_order():
     (experiment,) = select_experiments("a")
-    once = plan_trials(experiment.cases, 3, 0)
-    assert plan_trials([*experiment.cases, *experiment.cases], 3, 0) == once
-    assert [(p.key.trial, p.key.case_id) for p in once] == [
-        (t, c) for t in range(3) for c in ("s4", "s6")
-    ]
+    plan = plan_trials(experiment.cases, n_trials=3, root_seed=0)
+    assert plan_trials([*experiment.cases, *experiment.cases], n_trials=3, root_seed=0) == plan
+    expected_order = [(trial, case_id) for trial in range(3) for case_id in ("s4", "s6")]
+    assert [(planned.key.trial, planned.key.case_id) for planned in plan] == expected_order

@@ -32,7 +32,7 @@ LATER_COLLAPSE, LEARNED_AS_SOON, GROWTH_OF_COSTS = 6, 8, 9
 
 
 def fake_trials(case_id, agent, steps, n_trials=10, n_tests=1500):
-    """Trials that take the given steps in every test episode; one value, or one per trial."""
+    """Measure trials that take these steps in every evaluation; one number, or one per trial."""
     records = tuple(
         make_record(key=TrialKey(case_id, agent, trial, trial, "hash"), steps=np.full(n_tests, n))
         for trial, n in enumerate(np.broadcast_to(steps, (n_trials,)))
@@ -41,6 +41,7 @@ def fake_trials(case_id, agent, steps, n_trials=10, n_tests=1500):
 
 
 def cost(series, n_inputs, microseconds, config=None):
+    """Return a made-up record of times of a step, with the full settings by default."""
     config_hash = (config or CostConfig()).config_hash
     return CostRecord(
         series=series, n_inputs=n_inputs, microseconds=tuple(map(float, microseconds)), n_steps=1,
@@ -49,6 +50,7 @@ def cost(series, n_inputs, microseconds, config=None):
 
 
 def verdicts(summaries, costs=()):
+    """Return the verdicts by the numbers of their claims."""
     return {o.claim.number: o.verdict for o in judge_claims(summaries, costs)}
 
 
@@ -113,24 +115,24 @@ def test_claims_hold_for_good_trials_and_fail_for_bad_ones():
 
 
 def test_the_claim_that_fuzzy_q_learning_is_unstable_with_noise_fails_if_it_solves_the_task():
-    def judged(steps):
+    def verdict_with(steps):
         cases = ("s4-noise", "s5-noise", "s6-noise")
         return verdicts([fake_trials(case, "fuzzy", steps) for case in cases])[UNSTABLE_FUZZY]
 
-    assert judged(50) == Verdict.HOLDS, "an evaluation of 50 steps is not solved"
-    assert judged(7) == Verdict.FAILS
+    assert verdict_with(50) == Verdict.HOLDS, "an evaluation of 50 steps is not solved"
+    assert verdict_with(7) == Verdict.FAILS
 
 
 def test_a_difference_of_collapses_counts_none_as_the_last_episode():
-    def judged(steps_of_fewer_inputs):
+    def outcome_with(steps_of_fewer_inputs):
         fewer = fake_trials("s4-noise", "sdnn-c", steps_of_fewer_inputs)
         outcomes = judge_claims([fake_trials("s5-noise", "sdnn-c", 4), fewer], ())
         return next(o for o in outcomes if o.claim.number == LATER_COLLAPSE)
 
-    never_learned = judged(50)  # which counts as a collapse at episode 0
+    never_learned = outcome_with(50)  # which counts as a collapse at episode 0
     assert never_learned.checks[0].estimate == Estimate(*3 * [float(PAPER_EPISODES)])
     assert never_learned.verdict == Verdict.HOLDS
-    assert judged(4).verdict == Verdict.FAILS, "neither collapses"
+    assert outcome_with(4).verdict == Verdict.FAILS, "neither collapses"
 
 
 def test_evenly_split_trials_leave_a_claim_undecided():
@@ -155,10 +157,10 @@ COSTS = [
 def test_the_growth_of_costs_is_a_ratio_of_medians():
     (outcome,) = judge_claims([], COSTS)
     assert outcome.claim.number == GROWTH_OF_COSTS
-    growths = [checked.estimate for checked in outcome.checks]
+    growths = [checked.estimate for checked in outcome.checks]  # from 4 to 8 inputs
     assert growths[0] == Estimate(5.0, 5.0, 5.0)  # 50 / 10 microseconds
     assert growths[1] == Estimate(210.0, 200.0, 220.0)  # medians of 200, 210 and 220, over 1
-    assert growths[2] is None
+    assert growths[2] is None  # of a series without costs
     assert [c.verdict for c in outcome.checks] == [Verdict.HOLDS, Verdict.HOLDS, Verdict.NOT_RUN]
     assert outcome.verdict == Verdict.NOT_RUN
 

@@ -21,30 +21,30 @@ from sdnn.reproduction.cost import (
 )
 from sdnn.reproduction.report import cost_table
 from sdnn.runs import ResultStore, StoreError
-from sdnn.runs.trial import records_digest
 from sdnn.support import machine
 
 SMALL = CostConfig(n_inputs=(3, 2), n_rounds=3, round_seconds=0.001)
 
 
 class FakeMeasure:
-    """Times that grow fourfold with each input; records its requests."""
+    """Give times that grow fourfold with each input, and none beyond a number of inputs."""
 
-    def __init__(self, ends_after=math.inf):
+    def __init__(self, most_inputs=math.inf):
         self.requested = []
-        self._last = ends_after
+        self._most_inputs = most_inputs
 
     def __call__(self, series, n_inputs, config):
         self.requested.append((series.id, n_inputs))
-        if n_inputs > self._last:
+        if n_inputs > self._most_inputs:
             return None
-        times = 4.0**n_inputs * np.arange(1, config.n_rounds + 1)
-        return tuple(times.tolist()), 5, 9**n_inputs
+        microseconds = 4.0**n_inputs * np.arange(1, config.n_rounds + 1)
+        n_steps, table_bytes = 5, 9**n_inputs
+        return tuple(microseconds.tolist()), n_steps, table_bytes
 
 
 @pytest.fixture
 def measured(monkeypatch):
-    """Measure all costs with another clock; returns what is stored."""
+    """Measure all costs with a fake measure; return the stored records."""
 
     def _measured(folder, measure, config=SMALL):
         monkeypatch.setattr("sdnn.reproduction.cost.measure_steps", measure)
@@ -86,10 +86,9 @@ def test_stored_measurements_are_not_repeated(tmp_path, measured):
     assert second.requested == [(s.id, n) for s in SERIES for n in (2, 3)][3:]
     assert len(costs) == 2 * len(SERIES)
     third = FakeMeasure()
-    again = measured(tmp_path, third)
+    assert measured(tmp_path, third) == costs
     assert third.requested == []
-    assert again == costs
-    np.testing.assert_array_equal(costs[0].microseconds, [16.0, 32.0, 48.0])
+    np.testing.assert_array_equal(costs[0].microseconds, 4.0**2 * np.array([1, 2, 3]))  # 2 inputs
     assert (costs[0].n_steps, costs[0].table_bytes) == (5, 9**2)
     assert {cost.machine for cost in costs} == {machine.description()}
     assert {cost.version for cost in costs} == {_core.__version__}
@@ -97,22 +96,22 @@ def test_stored_measurements_are_not_repeated(tmp_path, measured):
 
 def test_costs_of_different_settings_are_stored_separately(tmp_path, measured):
     measured(tmp_path, FakeMeasure())
-    other = replace(SMALL, n_rounds=5)
-    of_other = measured(tmp_path, FakeMeasure(), other)
-    assert [len(c.microseconds) for c in of_other] == [5] * 2 * len(SERIES)
+    n_costs = 2 * len(SERIES)  # of 2 and 3 inputs
+    of_other = measured(tmp_path, FakeMeasure(), replace(SMALL, n_rounds=5))
+    assert [len(c.microseconds) for c in of_other] == [5] * n_costs
     with ResultStore(tmp_path) as store:
-        assert len(load_costs(store, SMALL.config_hash)) == 2 * len(SERIES)
-        assert store.load() == ()
-        assert records_digest(store.load()) == records_digest(())
+        assert len(load_costs(store, SMALL.config_hash)) == n_costs
+        assert store.load() == (), "costs are no trials"
 
 
 def test_costs_of_another_machine_or_version_are_measured_again(tmp_path, measured, monkeypatch):
     measured(tmp_path, FakeMeasure())
-    for place, name in ((machine, "description"), (_core, "__version__")):
+    another = (machine, "description", lambda: "another"), (_core, "__version__", "9.9.9")
+    for module, name, value in another:
         with monkeypatch.context() as patched:
-            patched.setattr(place, name, (lambda: "another") if place is machine else "9.9.9")
-            anew = FakeMeasure()
-            assert len(measured(tmp_path, anew)) == len(anew.requested) == 2 * len(SERIES)
+            patched.setattr(module, name, value)
+            measure = FakeMeasure()
+            assert len(measured(tmp_path, measure)) == len(measure.requested) == 2 * len(SERIES)
 
 
 def test_damaged_costs_are_named(tmp_path, measured):
@@ -124,7 +123,7 @@ def test_damaged_costs_are_named(tmp_path, measured):
 
 
 def test_the_table_of_costs_has_no_row_of_inputs_that_were_not_measured(tmp_path, measured):
-    rows = cost_table(measured(tmp_path, FakeMeasure(ends_after=2))).rows
+    rows = cost_table(measured(tmp_path, FakeMeasure(most_inputs=2))).rows
     assert [row[0] for row in rows] == ["2"]
 
 
@@ -143,7 +142,7 @@ def test_the_figure_of_costs_shows_the_stored_medians(tmp_path, measured):
     (axes,) = draw_cost(costs).axes
     assert axes.get_yscale() == "log"
     lines = [line for line in axes.get_lines() if len(line.get_xdata()) == 2]
-    np.testing.assert_allclose(lines[0].get_ydata(), [32.0, 128.0])
+    np.testing.assert_allclose(lines[0].get_ydata(), [2 * 4.0**2, 2 * 4.0**3])  # of 3 rounds
     assert "quick" in json.dumps([t.get_text() for t in draw_cost(costs, quick=True).axes[0].texts])
 
 
@@ -153,8 +152,9 @@ def test_every_series_measures_a_real_agent_and_its_table(series):
     assert len(microseconds) == 3
     assert min(microseconds) > 0
     assert n_steps >= 1
-    # A byte for each weight of 900 units, of two pairs of 200 columns; 9 sets in two inputs, 21
-    # actions of 4 bytes; 4 bases in two inputs and the action, of 8 bytes.
+    # Bytes for two inputs. SDNN-C: one for each weight of 900 units, of two pairs of 200 columns.
+    # Fuzzy: 9 sets for each input, 21 actions of 4 bytes. RBF: 4 bases for each input and the
+    # action, of 8 bytes.
     sizes = {"sdnn-c": 2 * 200 * 900, "fuzzy": 9**2 * 21 * 4, "rbf": 4**3 * 8}
     assert table_bytes == sizes[series.agent]
 
@@ -177,7 +177,8 @@ def test_timed_agents_learn_reproducibly_by_seed():
     def weights(agent_class, seed):
         rbf = _core.RBFNetworkConfig(n_inputs=2, n_actions=21)
         agent = agent_class(approximator=rbf, learning=_core.QLearningConfig(), seed=5)
-        assert (_core.time_agent_steps(agent, 40, seed) > 0).all()
+        n_steps = 40
+        assert (_core.time_agent_steps(agent, n_steps, seed) > 0).all()
         return (agent.networks[0] if agent_class is _core.BareAgent else agent.network).weights()
 
     first, plain = weights(_core.BareAgent, 1), weights(_core.PlainRBFQLearning, 1)

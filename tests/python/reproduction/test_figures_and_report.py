@@ -46,7 +46,7 @@ def all_text(figure):
 
 
 def curves_of(axes):
-    """The lines of a panel as (x, y), the thick one before the thin one."""
+    """Return the lines of a panel as (x, y), the thick one before the thin one."""
     lines = sorted(axes.get_lines(), key=lambda line: -line.get_linewidth())
     return [(line.get_xdata(), line.get_ydata()) for line in lines]
 
@@ -55,7 +55,7 @@ def test_panels_show_medians_and_quartiles_of_the_stored_rows(results):
     figure = draw_experiment(EXPERIMENT, results)
     for axes, result in zip(figure.axes[:2], results, strict=True):
         (_, smooth), (x, thin) = curves_of(axes)
-        np.testing.assert_array_equal(x, 10 * np.arange(1, 301))
+        np.testing.assert_array_equal(x, 10 * np.arange(1, 301))  # episodes of evaluations
         np.testing.assert_array_equal(thin, np.median(result.steps, axis=0))
         np.testing.assert_array_equal(smooth, running_median(thin, SMOOTHED_TESTS))
         (band,) = axes.collections
@@ -65,7 +65,8 @@ def test_panels_show_medians_and_quartiles_of_the_stored_rows(results):
             running_median(q, SMOOTHED_TESTS) for q in np.percentile(result.steps, (25, 75), axis=0)
         )
         for i in (0, 5, 120, 299):
-            assert {(10.0 * (i + 1), lower[i]), (10.0 * (i + 1), upper[i])} <= drawn
+            episode = 10.0 * (i + 1)
+            assert {(episode, lower[i]), (episode, upper[i])} <= drawn
         assert axes.get_ylim() == (0, 50)
         assert axes.get_xlim() == (0, 3000)
 
@@ -102,26 +103,24 @@ def test_figures_are_repeatable_to_the_byte(results):
 
 def test_a_reproduction_reads_each_trial_once(monkeypatch, tmp_path, use_trial):
     use_trial(fake_trial.FakeTrial)
-    calls = []
+    read_trials = []
+    make_record = ResultStore._make_record
 
-    def counted(name, function):
-        def call(*arguments, **options):
-            calls.append(name)
-            return function(*arguments, **options)
+    def make_and_count(*arguments):
+        read_trials.append(make_record(*arguments))
+        return read_trials[-1]
 
-        return call
-
-    monkeypatch.setattr(ResultStore, "_make_record", counted("trial", ResultStore._make_record))
+    monkeypatch.setattr(ResultStore, "_make_record", make_and_count)
     reproduction = run_study(PaperStudy(quick=True), tmp_path)
     # SDNN-C in Case I belongs to both figures: two trials of nine pairs of case and agent.
     assert [len(experiment["cases"]) for experiment in reproduction.table["experiments"]] == [2, 8]
-    assert calls == ["trial"] * 2 * 9
+    assert len(read_trials) == 2 * 9
     with ResultStore(tmp_path) as store:
         assert reproduction.table["digest"] == records_digest(store.load())
 
 
 def test_an_agent_has_the_same_color_in_every_figure(tmp_path, run, collected):
-    def colors(*agents):
+    def titles_and_colors(*agents):
         other = EXPERIMENT.with_agents(agents)
         run(tmp_path, plan_trials(other.cases, 1, 0, 100))
         figure = draw_experiment(other, collected(other, tmp_path, 1, 100))
@@ -129,9 +128,9 @@ def test_an_agent_has_the_same_color_in_every_figure(tmp_path, run, collected):
         lines = {line.get_color() for line in figure.axes[0].get_lines()}
         return [text.get_text() for text in legend.get_texts()], lines
 
-    titles, color = colors("rbf")
+    titles, color = titles_and_colors("rbf")
     assert titles == ["RBFN"]
-    titles, two_colors = colors("rbf", "sdnn-c")
+    titles, two_colors = titles_and_colors("rbf", "sdnn-c")
     assert titles == ["RBFN", "SDNN-C"]
     assert color < two_colors
     assert len(two_colors) == 2
@@ -144,15 +143,15 @@ def test_any_two_agents_of_a_figure_have_different_colors():
 
 def test_trials_of_mixed_configurations_are_refused(results):
     (first, *others) = results[0].records
-    odd = replace(first, key=first.key._replace(config_hash="other"))
-    refuses("configuration", measure, "", (odd, *others))
-    refuses("0", measure, "", ())
+    changed = replace(first, key=first.key._replace(config_hash="other"))
+    refuses("configuration", measure, "", (changed, *others))
+    refuses("0", measure, "", ())  # the number of trials
 
 
 def test_measures_of_fake_trials_are_as_worked_by_hand(results):
     summary = results[0]
-    steps = results[0].steps
-    first_good = [10.0 * (1 + int(np.argmax(row < 50))) for row in steps]
+    # Evaluations come every 10 episodes; once less than 50 steps, a fake trial stays good.
+    first_good = [10.0 * (1 + int(np.argmax(steps < 50))) for steps in summary.steps]
     assert summary.values["episodes_to_learn"].tolist() == first_good
     assert summary.medians["episodes_to_learn"].value == np.median(first_good)
     assert summary.medians["final_share_solved"] == Estimate(1.0, 1.0, 1.0)
@@ -161,10 +160,9 @@ def test_measures_of_fake_trials_are_as_worked_by_hand(results):
     assert summary.uncensored("episode_of_collapse").tolist() == [last_episode] * 3
     assert summary.to_json()["median_curve_episodes_to_learn"] == np.median(first_good)
     n_decisions = 3 * 3000 * 7  # trials, episodes, decisions of each fake episode
-    assert results[0].n_decisions == n_decisions
-    assert results[0].microseconds_per_decision == pytest.approx(
-        1e6 * sum(r.seconds for r in results[0].records) / n_decisions
-    )
+    assert summary.n_decisions == n_decisions
+    seconds = sum(record.seconds for record in summary.records)
+    assert summary.microseconds_per_decision == pytest.approx(1e6 * seconds / n_decisions)
 
 
 def test_estimates_are_formatted_with_units_and_censoring():
@@ -189,7 +187,7 @@ def test_tables_show_cases_and_claims(report):
     assert [row[0] for row in cases.rows] == [case.title for case in EXPERIMENT.cases]
     for table in (claims, checks, cases):
         assert {len(row) for row in table.rows} == {len(table.header)}
-    assert [row[0] for row in claims.rows] == ["1", "2", "8"]
+    assert [row[0] for row in claims.rows] == ["1", "2", "8"], "claims with cases of Experiment A"
     assert claims.header[-1] == "ours, so far [95 % interval]"
     # Medians of the fake trials, with their intervals.
     assert claims.rows[0][-1] == "episodes to learn: 50 [30, 50], 60 [50, 60]"
@@ -201,10 +199,10 @@ def test_a_terminal_shows_claims_and_on_demand_all_tables(report):
     page = report.page(PICTURES)
     page.print(brief)
     page.print(full, full=True)
-    few, all_lines = (console.file.getvalue().splitlines() for console in (brief, full))
-    assert "episodes to learn: 50 [30," in "\n".join(few)
-    assert max(map(len, few)) <= 80
-    assert len(all_lines) > 3 * len(few)
+    brief_lines, full_lines = (c.file.getvalue().splitlines() for c in (brief, full))
+    assert "episodes to learn: 50 [30," in "\n".join(brief_lines)
+    assert max(map(len, brief_lines)) <= 80
+    assert len(full_lines) > 3 * len(brief_lines)
 
 
 def test_json_is_valid_and_marks_censored_values(report):
@@ -246,11 +244,10 @@ def test_the_html_report_embeds_pictures_tables_and_settings(report, monkeypatch
     outcome = TrialsOutcome(n_planned=6, n_reused=0, n_run=6, failures=(), interrupted=False)
     monkeypatch.setattr("sdnn.support.machine.description", lambda: "a <machine>")
     page = report.page(PICTURES)
-    html = page.to_html(describe_call(outcome, 61, ()))
+    html = page.to_html(describe_call(outcome, 61, ()))  # 61 seconds
     assert html.startswith("<!doctype html>")
-    assert (
-        "data:image/svg+xml;base64," + base64.b64encode(PICTURES["experiment-a"]).decode() in html
-    )
+    picture = base64.b64encode(PICTURES["experiment-a"]).decode()
+    assert f"data:image/svg+xml;base64,{picture}" in html
     assert not re.search(r'(src|href)="(?!data:)', html)
     assert "a &lt;machine&gt;" in html
     assert "Everything asked for was run in 1 min 1 s" in html
@@ -267,7 +264,7 @@ def test_the_html_report_embeds_pictures_tables_and_settings(report, monkeypatch
 
 def test_the_report_names_measures_that_need_longer_trials(tmp_path, run, collected):
     (experiment,) = select_experiments("b")
-    run(tmp_path, plan_trials(experiment.cases, 2, 0, 100))
+    run(tmp_path, plan_trials(experiment.cases, n_trials=2, root_seed=0, n_episodes=100))
     results = collected(experiment, tmp_path, 2, 100)
     report = Report(experiments=((experiment, results),), costs=(), quick=True, seed=0)
     page = report.page({"experiment-b": PICTURES["experiment-a"]})

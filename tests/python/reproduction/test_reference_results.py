@@ -42,7 +42,7 @@ CASES = {case.id: case for experiment in EXPERIMENTS for case in experiment.case
 
 
 def measured(case_id, values, agent="sdnn-c", **changes):
-    """Trials with these final steps, which are solved from the first evaluation to the last."""
+    """Return measures of trials with these final steps; all their evaluations are solved."""
     n = len(values)
     measures = {
         "episodes_to_learn": np.full(n, 10.0),
@@ -74,27 +74,22 @@ def test_the_chance_of_a_claim_is_a_binomial_tail(n_good):
 
 def test_checks_of_a_claim_are_drawn_together():
     draws = TenTrials([measured("s4", 5 * [4] + 5 * [50])])
-    once, twice, never = (
-        draws.chance(Claim(1, "", checks))
-        for checks in (
-            (final_steps("s4", at_most=6),),
-            (final_steps("s4", at_most=6), final_steps("s4", at_most=7)),
-            (final_steps("s4", at_most=6), final_steps("s4", at_least=40)),
-        )
-    )
-    assert once == twice
-    both = [Claim(n, "", (final_steps("s4", **limits),)) for n, limits in enumerate(
-        ({"at_most": 6}, {"at_least": 40}))]  # fmt: skip
-    assert draws.chance(*both) == never
-    assert never == Estimate(0.0, 0.0, 0.0)
+    few, also_few = final_steps("s4", at_most=6), final_steps("s4", at_most=7)
+    many = final_steps("s4", at_least=40)
+    never = Estimate(0.0, 0.0, 0.0)
+    assert draws.chance(Claim(1, "", (few,))) == draws.chance(Claim(1, "", (few, also_few)))
+    assert draws.chance(Claim(1, "", (few, many))) == never
+    assert draws.chance(Claim(1, "", (few,)), Claim(2, "", (many,))) == never, "of both claims"
 
 
 def test_chances_count_censored_values_as_the_last_episode():
-    later = Claim(6, "", (next(c for c in CLAIMS if c.number == 6).checks))
-    late, early = measured("s5-noise", [4] * 3), measured("s4-noise", [4] * 3)
-    assert TenTrials([late, early]).chance(later).value == 0.0  # both end with the trials
+    # Claim 6: with a fifth sensor the performance collapses later.
+    claim = next(claim for claim in CLAIMS if claim.number == 6)
+    never_collapses = measured("s5-noise", [4] * 3)
+    also_never = measured("s4-noise", [4] * 3)
+    assert TenTrials([never_collapses, also_never]).chance(claim).value == 0.0
     early = measured("s4-noise", [4] * 3, episode_of_collapse=[5000, 6000, 7000])
-    assert TenTrials([late, early]).chance(later).value == 1.0
+    assert TenTrials([never_collapses, early]).chance(claim).value == 1.0
 
 
 def test_chances_without_trials_of_every_subject_are_none():
@@ -188,14 +183,15 @@ def fake_results(tmp_path, run, collected):
 
 
 def test_written_reference_results_are_read_unchanged(monkeypatch, tmp_path, fake_results):
-    content = script.reference_csv(fake_results, 7)
+    root_seed = 7
+    content = script.reference_csv(fake_results, root_seed)
     (tmp_path / "kept.csv").write_bytes(content)
     assert tuple(content.decode().splitlines()[0].split(",")) == HEADER
     monkeypatch.setattr(reference_module, "_FILES", tmp_path)
     monkeypatch.setattr(reference_module, "FILE_NAME", "kept.csv")
     read = reference_module.reference_results.__wrapped__()
     assert [(result.case_id, result.root_seed, result.n_trials) for result in read] == [
-        ("s4", 7, 12), ("s6", 7, 12)
+        ("s4", root_seed, 12), ("s6", root_seed, 12)
     ]  # fmt: skip
     for result, summary in zip(read, fake_results, strict=True):
         assert result.config_hash == summary.config_hash
@@ -217,10 +213,10 @@ def report_of(results, reference=()):
 
 def test_reports_show_reference_results_where_there_are_any(fake_results):
     picture = {"experiment-a": b"<svg xmlns='http://www.w3.org/2000/svg'/>"}
-    usual = report_of(fake_results)
-    assert "With more trials" not in [table.title for table in usual.page(picture).tables]
-    assert "With more trials" not in usual.page(picture).to_html("")
-    assert usual.to_json()["claims"][0]["with_more_trials"] is None
+    without = report_of(fake_results)
+    assert "With more trials" not in [table.title for table in without.page(picture).tables]
+    assert "With more trials" not in without.page(picture).to_html("")
+    assert without.to_json()["claims"][0]["with_more_trials"] is None
 
     half = measured("s4", 10 * [4] + 10 * [50])
     reference = [

@@ -18,7 +18,7 @@ from sdnn.runs.sweep import study_json, study_page
 
 
 def record(study, case, variant, number, steps, returns=None):
-    """A trial whose evaluations took these steps; an evaluation of 50 steps is not solved."""
+    """Return a trial whose evaluations took these steps; one of 50 steps is not solved."""
     return make_record(
         config=study.combinations[case, variant].spec.canonical_json(),
         key=study.keys(case, variant)[number],
@@ -36,7 +36,7 @@ def json_of(comparison):
 
 
 def steps_of(*runs):
-    """Steps of evaluations, from pairs of a number of evaluations and their steps."""
+    """Return steps of evaluations from pairs: a number of evaluations, and the steps of each."""
     return np.concatenate([np.full(n, steps) for n, steps in runs])
 
 
@@ -63,7 +63,8 @@ def records_of_old_and_new(study):
 
 
 def test_differences_between_variants_are_paired_by_trial(study):
-    comparison = compare(mine := study(TWO), records_of_old_and_new(mine))
+    mine = study(TWO)
+    comparison = compare(mine, records_of_old_and_new(mine))
     old, new = (comparison.measured["s4-noise", name] for name in ("old", "new"))
     # Shares of the last 50 evaluations with less than 50 steps, of four trials of each variant:
     # 40 failed ones at the end leave 0.2, five leave 0.9.
@@ -105,8 +106,8 @@ def test_variants_with_longer_trials_only_do_not_differ(study):
         ("s4-noise", "short"): ((100, 50),), ("s4-noise", "long"): ((200, 50), (100, 4)),
     }  # fmt: skip
     records = [
-        record(mine, *pair, number, steps_of(*of_pair))
-        for pair, of_pair in runs.items()
+        record(mine, case, variant, number, steps_of(*runs_of_trial))
+        for (case, variant), runs_of_trial in runs.items()
         for number in range(6)
     ]
     comparison = compare(mine, records)
@@ -135,13 +136,10 @@ def test_claims_of_each_case_are_censored_at_its_last_episode(study):
         for number in range(6)
     ]
     comparison = compare(mine, records)
-    claim = judge_variants(comparison)["long"][1]  # of the episodes to learn in both
+    claim = judge_variants(comparison)["long"][1]  # the episodes to learn in s4 and in s6
     assert [checked.last_episode for checked in claim.checks] == [3000, 5000]
-    claim_in_json = json_of(comparison)["claims"][0]
-    assert [check_in_json["ours"]["value"] for check_in_json in claim_in_json["checks"]] == [
-        ">3000",
-        ">5000",
-    ]
+    checks_in_json = json_of(comparison)["claims"][0]["checks"]
+    assert [check["ours"]["value"] for check in checks_in_json] == [">3000", ">5000"]
 
 
 @pytest.mark.parametrize(
@@ -178,19 +176,19 @@ def test_differences_of_fewer_than_six_trials_are_not_called_different(study):
             for variant, steps in (("old", 50), ("new", 4))
             for n in range(n_trials)
         ]
-        comparison = compare(mine, records).measured["s4-noise", "new"]
-        assert comparison.differences["final_steps"].upper == 4 - 50
-        assert comparison.differs("final_steps") is differs
-        assert not comparison.differs("mean_return")
+        new = compare(mine, records).measured["s4-noise", "new"]
+        assert new.differences["final_steps"].upper == 4 - 50
+        assert new.differs("final_steps") is differs
+        assert not new.differs("mean_return")
 
 
 def test_incomplete_combinations_are_omitted_with_a_warning(study):
     mine = study(TWO)
     records = records_of_old_and_new(mine)
-    comparison = compare(mine, records[:-1])
+    comparison = compare(mine, records[:-1])  # without the last trial of `new`
     assert list(comparison.measured) == [("s4-noise", "old")]
     assert page_of(comparison).warnings[0].startswith("Not complete: 1 of 2 combinations")
-    comparison = compare(mine, records[4:])
+    comparison = compare(mine, records[4:])  # without the four trials of `old`, the reference
     assert comparison.measured["s4-noise", "new"].differences == {}
     assert compare(mine, ()).measured == {}
 
@@ -208,9 +206,9 @@ agent = "fuzzy"
 
 
 def claimed_records(study, n_trials=10):
-    """Trials that are solved to the end; but with `old` those of Case II collapse at episode 7,500.
+    """Yield trials that are solved to the end, but those of `old` in Case II collapse half-way.
 
-    So the claims hold that SDNN-C collapses in Case II and later with more inputs.
+    So with `old` the claims hold that SDNN-C collapses in Case II and later with more inputs.
     """
     good, lost = steps_of((1500, 4)), steps_of((750, 4), (750, 50))
     for variant in ("old", "new", "fuzzy"):
@@ -380,22 +378,23 @@ def test_the_figure_shows_every_trial_and_is_reproducible(mixed):
     figure = draw_study(mixed, "footer")
     assert figure_bytes(figure) == figure_bytes(draw_study(mixed, "footer"))
     assert "filled: the reference, and what" in figure.texts[-1].get_text()
-    assert len(figure.axes) == 4
     assert [axes.get_title("left") for axes in figure.axes] == [
-        "Case I: 4 inputs, no noise", "A pendulum", "", "",
+        "Case I: 4 inputs, no noise", "A pendulum", "", "",  # two measures of each case
     ]  # fmt: skip
     for axes in figure.axes:
-        assert len(axes.collections) == 3
-        assert all(dots.get_offsets().shape == (2, 2) for dots in axes.collections)
+        assert len(axes.collections) == 3, "variants"
+        positions_of_trials = [dots.get_offsets() for dots in axes.collections]
+        assert all(positions.shape == (2, 2) for positions in positions_of_trials)
     assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == ["a", "b", "c"]
 
 
 def test_a_narrow_figure_has_its_panels_and_names_below_each_other(mixed):
     figure = draw_study(mixed, "footer", narrow=True)
     figure.draw_without_rendering()
-    edges = [(axes.get_position().x0, axes.get_position().y1) for axes in figure.axes]
-    assert len({round(left, 3) for left, _ in edges}) == 1
-    assert [top for _, top in edges] == sorted((top for _, top in edges), reverse=True)
+    lefts = [round(axes.get_position().x0, 3) for axes in figure.axes]
+    tops = [axes.get_position().y1 for axes in figure.axes]
+    assert len(set(lefts)) == 1
+    assert tops == sorted(tops, reverse=True)
     for axes in figure.axes:
         assert [label.get_text() for label in axes.get_yticklabels()] == ["a", "b", "c"]
     width = figure.get_window_extent().x1
@@ -406,5 +405,5 @@ def test_many_cases_wrap_to_the_next_row(study):
     mine = study(OWN + "[study]\ntrials = 1\n" + "".join(f"[cases.c{i}]\n" for i in range(7)))
     records = [record(mine, f"c{i}", "base", 0, steps_of((60, 4))) for i in range(7)]
     figure = draw_study(compare(mine, records), "")
-    assert len(figure.axes) == 4 * 5  # five cases in a row, two panels for each
-    assert sum(axes.get_visible() for axes in figure.axes) == 2 * 7
+    assert len(figure.axes) == 2 * 5 * 2  # two rows of five cases, with two panels for each
+    assert sum(axes.get_visible() for axes in figure.axes) == 7 * 2
