@@ -29,18 +29,19 @@ def headers():
 
 
 def includes(header):
+    """Return the headers of the library that a header includes, by their paths below it."""
     text = (INCLUDE / header).read_text("utf-8")
     return [Path(name) for name in re.findall(r'^#include "sdnn/(.+)"', text, re.MULTILINE)]
 
 
 def test_headers_include_lower_layers_only():
-    wrong = [
-        f"{header} includes {included}"
-        for header in headers()
-        for included in includes(header)
-        if (here := header.parts[0]) != (there := included.parts[0])
-        if LAYERS[there] >= LAYERS[here] or (here == "environments" and there != "core")
-    ]
+    wrong = []
+    for header in headers():
+        for included in includes(header):
+            package, other = header.parts[0], included.parts[0]
+            is_allowed = package == other or LAYERS[other] < LAYERS[package]
+            if not is_allowed or (package == "environments" and other not in (package, "core")):
+                wrong.append(f"{header} includes {included}")
     assert len(headers()) > 80
     assert wrong == []
 
@@ -54,6 +55,7 @@ def test_headers_with_floating_point_include_the_check_of_compiler_options():
     guard = Path("core/detail/floating_point.hpp")
 
     def reached(header, visited):
+        """Return all headers that a header includes, directly or by others."""
         for included in includes(header):
             if included not in visited:
                 visited.add(included)
@@ -93,7 +95,7 @@ def arrows_between_children(graph, package):
 
 
 def test_the_package_graph_has_few_packages_and_imports(imports):
-    arrows = arrows_between_children(imports, "sdnn")
+    arrows = arrows_between_children(imports, "sdnn")  # lower the limits where they can be lower
     assert len(arrows) <= 18
     assert sum(map(len, arrows.values())) <= 55
 

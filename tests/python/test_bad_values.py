@@ -1,6 +1,7 @@
 """Bad values of every argument, setting, option and file are refused by name, or work.
 
-This is a sample; ``nox -s robustness`` tries more, ``nox -s robustness-weekly`` all.
+A cell of a matrix gives one bad value to one parameter. Here a sample of the cells is run;
+``nox -s robustness`` runs more, ``nox -s robustness-weekly`` all.
 """
 
 import pytest
@@ -12,15 +13,15 @@ from matrices import MATRICES, sample_cells
 from sdnn.cli import main
 from watched_cells import failures, faulty_cells
 
-EVERY = {"agents": 41, "core": 41, "classes": 41, "commands": 29, "files": 47}
-"""Primes: the sample walks through the values; it has some hundred cells, not every parameter."""
+STRIDES = {"agents": 41, "core": 41, "classes": 41, "commands": 29, "files": 47}
+"""Distances between the cells that are run. They are primes, so that all bad values are sampled."""
 
 
 @pytest.mark.parametrize("matrix", MATRICES)
 def test_a_sample_of_bad_values_is_refused_by_name_or_accepted(matrix, monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     monkeypatch.setenv("MPLBACKEND", "Agg")
-    n_cells, failed = failures(sample_cells, MATRICES[matrix], EVERY[matrix])
+    n_cells, failed = failures(sample_cells, MATRICES[matrix], STRIDES[matrix])
     assert failed == []
     assert n_cells >= 40
 
@@ -28,10 +29,10 @@ def test_a_sample_of_bad_values_is_refused_by_name_or_accepted(matrix, monkeypat
 def test_crashes_and_hangs_are_failed_cells(monkeypatch):
     monkeypatch.setattr("watched_cells.HANG_SECONDS", 5.0)
     n_cells, failed = failures(faulty_cells)
-    assert n_cells == 7
+    assert n_cells == 7  # the first works; the others are wrong, raise, hang, crash, and so on
     assert failed[:2] == ["wrong: was wrong", "raising: ZeroDivisionError: division by zero"]
     assert failed[2] == "hanging: hangs for more than 5.0 s"
-    assert failed[3].startswith("crashing: ended the process with exit code -6")
+    assert failed[3].startswith("crashing: ended the process with exit code -6")  # SIGABRT
     assert failed[4].startswith("eating: MemoryError")
     assert failed[5:] == ["last: was last"]
 

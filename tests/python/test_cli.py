@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -66,13 +65,13 @@ def test_a_quick_reproduction_writes_marked_files_and_a_summary(invoke, tmp_path
         "experiment-a-quick.png", "experiment-a-quick.svg", "report-quick.html",
         "results-quick.csv", "results-quick.md", "results.sqlite", "table-quick.json",
     ]  # fmt: skip
-    assert result.stderr == ""  # no progress where there is no terminal
+    assert result.stderr == "", "no progress bars where there is no terminal"
     assert "QUICK LOOK" in result.stdout
     assert "so far" in result.stdout
     # Two trials of each of the two cases of Experiment A.
     assert "4 of 4 trials are stored in out (4 run now)" in " ".join(result.stdout.split())
     again = invoke("reproduce", "a", "--quick", "--out", "out")
-    assert "(0 run now)" in " ".join(again.stdout.split())  # the stored ones are taken
+    assert "(0 run now)" in " ".join(again.stdout.split())
 
 
 @pytest.mark.parametrize(
@@ -121,15 +120,16 @@ def test_a_trial_of_the_most_episodes_is_accepted_and_of_more_refused():
 
 @pytest.fixture
 def no_costs(monkeypatch):
-    """Let measurements of costs take no time; returns the list of those that were requested."""
+    """Replace measurements of costs; return the list of those that were requested."""
     from sdnn.reproduction import cost
 
     requested = []
 
     def measure(series, n_inputs, config):
         requested.append((series.id, n_inputs))
-        times = float(n_inputs) * np.ones(config.n_rounds)
-        return tuple(times.tolist()), 1, 1
+        microseconds = (float(n_inputs),) * config.n_rounds
+        n_steps = table_bytes = 1
+        return microseconds, n_steps, table_bytes
 
     monkeypatch.setattr(cost, "measure_steps", measure)
     return requested
@@ -203,8 +203,9 @@ def test_dry_run_opens_the_store_for_reading_only(invoke, tmp_path, monkeypatch)
     monkeypatch.setattr("sdnn.runs.store.sqlite3.connect", connect)
     result = invoke("reproduce", "a", "--quick", "--dry-run")
     assert result.stdout.count("2 trials x 300 episodes of sdnn-c, 2 of them") == 2
-    assert opened
-    assert all(place.endswith("?mode=ro") for place in opened)
+    opened_files = [place for place in opened if place != ":memory:"]
+    assert opened_files
+    assert all(place.endswith("?mode=ro") for place in opened_files)
     assert sorted((tmp_path / "results").iterdir()) == files
 
 
@@ -216,8 +217,8 @@ def test_dry_run_counts_measurements_of_costs(invoke, no_costs):
     assert invoke("reproduce", "--dry-run").stdout.splitlines()[-1] == planned
     last_line = invoke("reproduce", "cost", "--quick").stdout.splitlines()[-1]
     assert re.fullmatch(r"wrote \d+ files: see .*report-quick\.html", last_line)
-    dry = invoke("reproduce", "cost", "--quick", "--dry-run").stdout
-    assert dry.splitlines() == [line.format(n_quick, n_quick)]
+    forecast = invoke("reproduce", "cost", "--quick", "--dry-run").stdout
+    assert forecast.splitlines() == [line.format(n_quick, n_quick)]
     plan = json.loads(invoke("reproduce", "a", "--dry-run", "--json").stdout)
     assert plan["costs"] == {"planned": 0, "stored": 0}
 
@@ -257,9 +258,9 @@ def test_a_preset_is_run_beside_the_papers_agents(invoke, tmp_path, no_costs):
 
 
 def test_costs_are_measured_for_the_selected_agent_only(invoke, no_costs):
-    dry = invoke("reproduce", "cost", "--agent", "rbf", "--dry-run")
-    n_planned = 2 * 7  # two series of 2 to 8 inputs
-    assert re.findall(r"\d+", dry.stdout) == [str(n_planned), "0"]
+    forecast = invoke("reproduce", "cost", "--agent", "rbf", "--dry-run")
+    n_planned, n_stored = 2 * 7, 0  # two series of 2 to 8 inputs
+    assert re.findall(r"\d+", forecast.stdout) == [str(n_planned), str(n_stored)]
     table = json.loads(invoke("reproduce", "cost", "--agent", "rbf", "--quick", "--json").stdout)
     assert {cost["series"] for cost in table["costs"]} == {"rbf", "rbf-plain"}
     assert {series for series, _ in no_costs} == {"rbf", "rbf-plain"}
@@ -299,6 +300,7 @@ class Pumping:
 
 @pytest.fixture
 def pumping():
+    """Register the agent `Pumping`."""
     parts = {"approximator": PumpingConfig, "learning": ThresholdConfig, "agent": Pumping}
     register(AgentEntry(id="pumping", title="Pumping", **parts))
     yield
@@ -317,8 +319,8 @@ def test_a_registered_agent_class_is_reproduced_with_figures_and_reports(invoke,
     assert len(rows) == 4 * 2 * 30  # cases, trials, evaluations
     assert {row["agent"] for row in rows} == {"pumping"}
     assert {row["case"] for row in rows} == {"s4", "s4-noise", "s5-noise", "s6-noise"}
-    in_time = [row["solved"] == "1" for row in rows if row["case"] == "s4"]
-    assert 0 < sum(in_time) < len(in_time)  # easy while the goal is wide
+    is_solved = [row["solved"] == "1" for row in rows if row["case"] == "s4"]
+    assert 0 < sum(is_solved) < len(is_solved), "solved in early episodes, whose goal is wide"
     # The agent is deterministic, so trials differ by the noise of their sensors alone.
     steps = {}
     for row in rows:
@@ -326,13 +328,11 @@ def test_a_registered_agent_class_is_reproduced_with_figures_and_reports(invoke,
     assert steps["s4", "0"] == steps["s4", "1"]
     assert steps["s4-noise", "0"] != steps["s4-noise", "1"]
     assert (folder / "experiment-b-pumping-quick.png").read_bytes().startswith(b"\x89PNG")
-    assert (
-        "| Case I: 4 inputs, no noise | Pumping | 2 |"
-        in (folder / "results-pumping-quick.md").read_text()
-    )
+    markdown = (folder / "results-pumping-quick.md").read_text()
+    assert "| Case I: 4 inputs, no noise | Pumping | 2 |" in markdown
     assert "Pumping" in (folder / "report-pumping-quick.html").read_text()
     table = json.loads((folder / "table-pumping-quick.json").read_text())
-    assert table["claims"] == []  # the paper says nothing about it
+    assert table["claims"] == [], "the paper has no claims about this agent"
     assert "(0 " in call("b", "--quick", "--agent", "pumping").stdout
     error = refused("reproduce", "cost", "--agent", "pumping", code=2)
     assert "agents whose cost is measured are sdnn-c, fuzzy, rbf, got pumping" in error

@@ -1,4 +1,4 @@
-"""The library's own exceptions, wherever they are defined."""
+"""The library's own exceptions, of all its modules."""
 
 import contextlib
 import copy
@@ -33,15 +33,15 @@ def error_classes():
 
 @pytest.mark.parametrize("copied", [copy.copy, lambda error: pickle.loads(pickle.dumps(error))])
 def test_errors_equal_their_copies_and_pickles(copied):
-    """An error that cannot be unpickled would end a pool of processes, and its message be lost."""
+    # An error that cannot be unpickled would end a pool of processes without its message.
     classes = error_classes()
     assert {"ConfigError", "StoreError", "UnusableStepError"} <= {
         error_class.__name__ for error_class in classes
     }
     for error_class in classes:
-        has_own = inspect.isfunction(error_class.__init__)
-        arguments = list(inspect.signature(error_class).parameters) if has_own else ["message"]
-        error = error_class(*(f"{word} of it" for word in arguments))
+        defines_init = inspect.isfunction(error_class.__init__)
+        names = list(inspect.signature(error_class).parameters) if defines_init else ["message"]
+        error = error_class(*(f"the {name}" for name in names))
         copy_ = copied(error)
         assert type(copy_) is error_class
         assert str(copy_) == str(error), error_class

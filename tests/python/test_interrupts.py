@@ -14,8 +14,13 @@ from sdnn.agents import Callback, CheckpointCallback, JSONLines, SDNNQLearning, 
 from sdnn.support.interrupts import Interrupts, stay_interrupts, thread_pool
 
 
+def press_ctrl_c():
+    os.kill(os.getpid(), signal.SIGINT)
+
+
 @pytest.fixture(autouse=True)
 def python_handler():
+    """Begin with Python's handler of Ctrl-C, which the tested code must leave or restore."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
@@ -26,10 +31,10 @@ def test_the_first_signal_calls_back_and_the_second_interrupts():
     calls = []
     with Interrupts(lambda: calls.append(1)) as interrupts:
         assert interrupts.received is None
-        os.kill(os.getpid(), signal.SIGINT)
+        press_ctrl_c()
         assert (calls, interrupts.received) == ([1], signal.SIGINT)
         with pytest.raises(KeyboardInterrupt):
-            os.kill(os.getpid(), signal.SIGINT)
+            press_ctrl_c()
     assert calls == [1]
 
 
@@ -58,21 +63,21 @@ def test_another_thread_than_the_main_one_keeps_the_handler():
 
 
 class InterruptIn(gym.Wrapper):
-    """An environment in whose n-th step somebody presses Ctrl-C, perhaps twice."""
+    """Send SIGINT, as Ctrl-C does, ``times`` times within the step with the number ``step``."""
 
     def __init__(self, env, step, times):
         super().__init__(env)
-        self._left, self._times = step, times
+        self._n_left, self._times = step, times
 
     def step(self, action):
-        self._left -= 1
-        if self._left == 0:
+        self._n_left -= 1
+        if self._n_left == 0:
             for _ in range(self._times):
-                os.kill(os.getpid(), signal.SIGINT)
+                press_ctrl_c()
         return self.env.step(action)
 
 
-class Count(Callback):
+class CountEnds(Callback):
     n = 0
 
     def on_end(self, training):
@@ -91,14 +96,14 @@ def test_a_training_interrupted_by_ctrl_c_resumes_exactly(tmp_path, times, saved
 
     def callbacks(name):
         rows = JSONLines(tmp_path / f"{name}.jsonl")
-        return [rows, CheckpointCallback(tmp_path / name, every=30), Count()]
+        return [rows, CheckpointCallback(tmp_path / name, every=30), CountEnds()]
 
     make(gym.make("CartPole-v1"), "whole").run()
     training = make(InterruptIn(gym.make("CartPole-v1"), 47, times), "cut")
     with pytest.raises(KeyboardInterrupt):
         training.run()
     assert training.callbacks[2].n == 1
-    assert training.is_within_step == (times == 2)
+    assert training.is_within_step == (times == 2)  # the second signal does not wait for its end
     if times == 2:
         refuses("step", training.run, error=RuntimeError)
     loaded = Training.load(tmp_path / "cut", gym.make("CartPole-v1"), callbacks=callbacks("cut"))
@@ -110,20 +115,17 @@ def test_a_training_interrupted_by_ctrl_c_resumes_exactly(tmp_path, times, saved
     assert (tmp_path / "cut.jsonl").read_text() == (tmp_path / "whole.jsonl").read_text()
 
 
-def press_ctrl_c():
-    os.kill(os.getpid(), signal.SIGINT)
-
-
-def press_ctrl_c_in_other_code():
+def convert_ctrl_c():
+    """Raise another error for Ctrl-C, as some libraries do."""
     try:
         press_ctrl_c()
     except KeyboardInterrupt:
         raise ValueError("Invalid affine transformation matrix") from None
 
 
-def test_ctrl_c_converted_to_another_error_is_raised_as_keyboard_interrupt():
+def test_ctrl_c_that_other_code_converts_or_catches_is_raised_as_keyboard_interrupt():
     with pytest.raises(KeyboardInterrupt), stay_interrupts():
-        press_ctrl_c_in_other_code()
+        convert_ctrl_c()
     with pytest.raises(KeyboardInterrupt), stay_interrupts(), suppress(KeyboardInterrupt):
         press_ctrl_c()
     with pytest.raises(KeyboardInterrupt), stay_interrupts():
@@ -155,14 +157,14 @@ def test_in_other_threads_the_handler_of_ctrl_c_is_not_replaced():
 
 
 def test_ctrl_c_at_the_end_of_a_pool_waits_for_its_threads():
-    ended = []
+    has_ended = []
 
     def work():
         time.sleep(0.1)
-        os.kill(os.getpid(), signal.SIGINT)
+        press_ctrl_c()
         time.sleep(0.2)
-        ended.append(True)
+        has_ended.append(True)
 
     with pytest.raises(KeyboardInterrupt), thread_pool(1) as pool:
         pool.submit(work)
-    assert ended
+    assert has_ended

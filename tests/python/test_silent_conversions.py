@@ -11,7 +11,7 @@ from sdnn.environments import AcrobotSwingUpVectorEnv, NoisySensors, RedundantSe
 from sdnn.runs import RunSpec, trial_seed
 from sdnn.runs.settings import convert_value
 
-OTHERS = {
+NOT_TWO_NUMBERS = {
     "masked": lambda: np.ma.masked_array([0.1, 0.2], [False, True]),
     "dates": lambda: np.array(["1970-01-02", "1970-01-03"], "M8[D]"),
     "times": lambda: np.array([1, 2], "m8[s]"),
@@ -25,7 +25,7 @@ OTHERS = {
     "three": lambda: [0.1, 0.2, 0.3],
     "none": lambda: [],
 }
-HERE = np.array([0.1, 0.2])
+PAIR = np.array([0.1, 0.2])
 
 
 class Plane(gym.Env):
@@ -37,7 +37,7 @@ def agent():
     return RBFQLearning(Plane.observation_space, Plane.action_space, seed=1)
 
 
-def composed():
+def agent_of_dict():
     space = gym.spaces.Dict(at=Plane.observation_space)
     return RBFQLearning(space, gym.spaces.Discrete(2), seed=1)
 
@@ -48,46 +48,45 @@ def acrobots():
     return envs
 
 
-TAKERS = {
+CALLS = {
     "act": lambda pair: agent().act(pair),
-    "act, of a Dict": lambda pair: composed().act({"at": pair}),
-    "learn, observation": lambda pair: agent().learn(Transition(pair, HERE, 1.0, HERE, False)),
-    "learn, next": lambda pair: agent().learn(Transition(HERE, HERE, 1.0, pair, False)),
+    "act, of a Dict": lambda pair: agent_of_dict().act({"at": pair}),
+    "learn, observation": lambda pair: agent().learn(Transition(pair, PAIR, 1.0, PAIR, False)),
+    "learn, next": lambda pair: agent().learn(Transition(PAIR, PAIR, 1.0, pair, False)),
     "values": lambda pair: agent().q_values(pair),
     "UnitSensors": lambda pair: UnitSensors(Plane()).observation(pair),
     "RedundantSensors": lambda pair: RedundantSensors(Plane(), [np.sum]).observation(pair),
     "NoisySensors": lambda pair: NoisySensors(Plane()).observation(pair),
     "observation_low": lambda pair: UnitSensors(Plane(), pair, [1.0, 1.0]),
-    "knots": lambda pair: RandomInverse(knots=pair, spacing="quantile").fit(HERE, 400),
+    "knots": lambda pair: RandomInverse(knots=pair, spacing="quantile").fit(PAIR, 400),
 }
-LISTS = {
-    "learn, action": lambda pair: agent().learn(Transition(HERE, pair, 1.0, HERE, False)),
+CALLS_WITH_ANY_SHAPE = {
+    "learn, action": lambda pair: agent().learn(Transition(PAIR, pair, 1.0, PAIR, False)),
     "actions of acrobots": lambda pair: acrobots().step(pair),
 }
-"""Takers of two numbers in any shape."""
-CELLS = {
+CALLS_WITH_SAMPLES = {
     "kernel": lambda pair: AnalyticKernel("anchor", n_inputs=2, n_units=100)([pair]),
     "coding": lambda pair: RandomInverse().fit(pair, 400),
 }
-"""Takers of samples: of any number of them, and words become a clear error of their own."""
+"""Calls with any number of samples; other tests check their error for words."""
 
 
-@pytest.mark.parametrize("name", [*TAKERS, *LISTS, *CELLS])
+@pytest.mark.parametrize("name", [*CALLS, *CALLS_WITH_ANY_SHAPE, *CALLS_WITH_SAMPLES])
 def test_values_that_numpy_would_convert_silently_are_refused(name):
-    shapes = {"a column", "a row"} if name in LISTS else set()
-    if name in CELLS:
-        shapes = {"a column", "a row", "three", "objects"}
-    take = (TAKERS | LISTS | CELLS)[name]
-    for word, make in OTHERS.items():
-        if word not in shapes:
+    accepted = {"a column", "a row"} if name in CALLS_WITH_ANY_SHAPE else set()
+    if name in CALLS_WITH_SAMPLES:
+        accepted = {"a column", "a row", "three", "objects"}
+    call = (CALLS | CALLS_WITH_ANY_SHAPE | CALLS_WITH_SAMPLES)[name]
+    for word, make in NOT_TWO_NUMBERS.items():
+        if word not in accepted:
             with pytest.raises((TypeError, ValueError)) as error:
-                take(make())
-            assert "incompatible" not in str(error.value), word
-    if name != "knots":
-        take(HERE)
+                call(make())
+            assert "incompatible" not in str(error.value), "a message of the bindings"
+    if name != "knots":  # which need other numbers
+        call(PAIR)
 
 
-NUMBERS = {
+NOT_NUMBERS = {
     "a text": "1", "a text of NumPy": np.str_("1"), "a date": np.datetime64(1, "ns"),
     "a time": np.timedelta64(1, "ns"), "complex": 1 + 0j, "masked": np.ma.masked_array(1, True),
     "bytes": b"1",
@@ -97,9 +96,9 @@ BOOLS = {"True": True, "True of NumPy": np.True_, "an array": np.array(True)}
 
 @pytest.mark.parametrize("kind", [int, float])
 def test_texts_dates_and_bools_are_refused_as_numbers(kind):
-    for word, value in {**NUMBERS, **BOOLS, "not finite": np.nan}.items():
+    for value in (*NOT_NUMBERS.values(), *BOOLS.values(), np.nan):
         with pytest.raises(Exception, match="must be"):
-            assert convert_value(kind, value, "key") is None, word
+            convert_value(kind, value, "key")
 
 
 def test_settings_of_wrong_types_are_refused_with_their_table():
@@ -113,7 +112,7 @@ def test_settings_of_wrong_types_are_refused_with_their_table():
 
 
 def test_seeds_of_trials_must_be_integers():
-    for value in (*NUMBERS.values(), *BOOLS.values(), 0.5, 1.0, [1]):
+    for value in (*NOT_NUMBERS.values(), *BOOLS.values(), 0.5, 1.0, [1]):
         with pytest.raises(ValueError, match="root_seed"):
             trial_seed(value, "s4", 0)
         with pytest.raises(ValueError, match=r"\btrial\b"):
