@@ -49,11 +49,12 @@ def test_a_custom_handler_is_not_replaced():
         signal.signal(signal.SIGTERM, before)
 
 
-def test_another_thread_than_the_main_one_keeps_the_handler():
+@pytest.mark.parametrize("make_context", [lambda: Interrupts(lambda: None), stay_interrupts])
+def test_in_other_threads_than_the_main_one_the_handler_is_not_replaced(make_context):
     handlers = []
 
     def enter():
-        with Interrupts(lambda: None):
+        with make_context():
             handlers.append(signal.getsignal(signal.SIGINT))
 
     thread = threading.Thread(target=enter)
@@ -141,19 +142,6 @@ def test_unrelated_errors_and_handled_ctrl_c_are_not_changed():
     assert calls == [1]
     with stay_interrupts():
         pass  # raises nothing
-
-
-def test_in_other_threads_the_handler_of_ctrl_c_is_not_replaced():
-    entered = []
-
-    def enter():
-        with stay_interrupts():
-            entered.append(signal.getsignal(signal.SIGINT))
-
-    thread = threading.Thread(target=enter)
-    thread.start()
-    thread.join()
-    assert entered == [signal.default_int_handler]
 
 
 def test_ctrl_c_at_the_end_of_a_pool_waits_for_its_threads():

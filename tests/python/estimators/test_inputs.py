@@ -40,20 +40,17 @@ def test_columns_are_selected_as_in_a_column_transformer():
         assert column_indices(columns, names, 3, np.zeros((4, 3))) == expected
 
 
-def test_columns_that_do_not_exist_are_refused():
+def test_columns_that_do_not_exist_or_are_not_given_are_refused():
     names = ["a", "b", "c"]
     for bad, error in [(3, "3"), ("d", "'d'"), (1.5, "1.5")]:
         refuses(error, column_indices, bad, names, 3)
     refuses("mask", column_indices, [True], names, 3)
+    refuses("coding", codings_of_columns, [("anchor",)], None, 3)
 
 
 def test_columns_that_are_not_listed_have_the_default_coding():
     codings = codings_of_columns([("anchor", [1])], None, 3)
     assert [coding.name for coding in codings] == ["random-inverse", "anchor", "random-inverse"]
-
-
-def test_a_coding_without_columns_in_a_list_is_refused():
-    refuses("coding", codings_of_columns, [("anchor",)], None, 3)
 
 
 def test_pairs_are_ordered_and_may_be_names():

@@ -1,7 +1,7 @@
-"""Writes the files that both languages must read alike: call it to renew tests/data.
+"""Writes the files of tests/data, which C++ and Python must read alike.
 
-For each agent: a file, some steps (observations, actions and so on), and the file that the agent
-leaves after them. Of the other kinds of files: a small one.
+For each agent: a file, the steps that it takes when the file is loaded (observations, actions and
+so on), and the file after these steps. For trainings and estimators: a small file.
 """
 
 import json
@@ -55,9 +55,9 @@ N_STEPS = 40
 
 
 def agents():
-    """The agents by name, of all kinds that both languages know."""
+    """Yield names and agents, of all classes that both languages have."""
     fuzzy = FuzzyQLearningConfig(trace_decay=0.7, n_greedy_steps=0, epsilon=0.3)
-    made = {
+    classes = {
         "sdnn": SDNNQLearning,
         "sdnn-vector": SDNNQLearning,
         "sdnn-discrete": SDNNQLearning,
@@ -96,22 +96,21 @@ def agents():
         "fuzzy": rules,
         "fuzzy-vector": rules,
     }
-    for name, kind in made.items():
-        yield (
-            name,
-            kind(
-                GEARS if name == "sdnn-symbols" else OBSERVATIONS,
-                spaces.get(name, TORQUE),
-                angle_pairs=[(3, 4)] if name == "sdnn-symbols" else [(0, 1)],
-                warm_up_steps=140 if name == "sdnn-warm-up" else 50,
-                seed=11,
-                **settings.get(name, {"approximator": SMALL, "learning": LEARNING}),
-            ),
+    for name, agent_class in classes.items():
+        has_symbols = name == "sdnn-symbols"
+        agent = agent_class(
+            GEARS if has_symbols else OBSERVATIONS,
+            spaces.get(name, TORQUE),
+            angle_pairs=[(3, 4)] if has_symbols else [(0, 1)],  # cosine and sine, after the gear
+            warm_up_steps=140 if name == "sdnn-warm-up" else 50,  # 140: not over in the file
+            seed=11,
+            **settings.get(name, {"approximator": SMALL, "learning": LEARNING}),
         )
+        yield name, agent
 
 
 def record_steps(agent, rng, n_steps):
-    """Run some steps; return observations, actions and rewards of each."""
+    """Let the agent act and learn in a made-up task; return what happened in each step."""
     steps = []
     turn, speed, other = rng.uniform(-3, 3, 3)
 
@@ -123,19 +122,19 @@ def record_steps(agent, rng, n_steps):
 
     begins = True
     for _ in range(n_steps):
-        seen = observe()
+        observation = observe()
         if begins:
             agent.begin_episode()
-        action = agent.act(seen)
-        greedy = agent.act(seen, explore=False)
+        action = agent.act(observation)
+        greedy = agent.act(observation, explore=False)
         turn, speed, other = turn + 0.2 * speed, rng.uniform(-8, 8), rng.normal()
         next_observation = observe()
         reward, terminated = float(rng.normal()), bool(rng.random() < 0.1)
-        agent.learn(Transition(seen, action, reward, next_observation, terminated))
+        agent.learn(Transition(observation, action, reward, next_observation, terminated))
         steps.append(
             {
                 "begins": begins,
-                "observation": agent.flat_observation(seen).tolist(),
+                "observation": agent.flat_observation(observation).tolist(),
                 "action": np.atleast_1d(action).tolist(),
                 "greedy": np.atleast_1d(greedy).tolist(),
                 "reward": reward,
@@ -164,7 +163,7 @@ def write(folder):
 
 
 def write_agents(folder):
-    """Write those of agents."""
+    """Write the files of agents and their steps."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, agent in agents():
         rng = np.random.default_rng(5)

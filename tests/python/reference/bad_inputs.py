@@ -1,7 +1,7 @@
 """A matrix of bad inputs, made from signatures and fields: a new parameter is covered by itself.
 
-A cell gives one bad value to one parameter of one callable. The call must refuse it by a typed
-error that names the parameter, and leave the agent as it was; or take it and work.
+A cell (a name, and a function that returns a fault) gives one bad value to one parameter. The call
+must refuse it by a typed error that names the parameter, and not change the agent; or work.
 """
 
 import contextlib
@@ -85,14 +85,14 @@ BAD = {
 
 
 def endless():
-    """A list that contains itself."""
+    """Return a list that contains itself."""
     items = []
     items.append(items)
     return items
 
 
 def deep(kind, levels=100_000):
-    """Lists in lists, or tuples in tuples, beyond the depth at which Python gives up."""
+    """Return nested lists or tuples, deeper than Python's limit of recursion."""
     nested = kind()
     for _ in range(levels):
         nested = kind([nested])
@@ -177,17 +177,17 @@ ENOUGH = 40
 
 
 class EnoughError(Exception):
-    """Check that a request was fulfilled."""
+    """Ends a training that a bad value makes too long."""
 
 
 class Slope(gym.Env):
-    """A task that ends the training which asks for too much of it."""
+    """Task of holding a position; raises `EnoughError` after a number of steps."""
 
     observation_space = PLANE
 
-    def __init__(self, action_space, lasts=10**9):
+    def __init__(self, action_space, most_steps=10**9):
         self.action_space = action_space
-        self._left = lasts
+        self._n_left = most_steps
 
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
@@ -195,8 +195,8 @@ class Slope(gym.Env):
         return np.array(HERE), {}
 
     def step(self, action):
-        self._left -= 1
-        if self._left < 0:
+        self._n_left -= 1
+        if self._n_left < 0:
             raise EnoughError
         self._n += 1
         at = np.clip(np.array(HERE) + 0.1 * np.asarray(action).sum(), -1.0, 1.0)
@@ -204,6 +204,7 @@ class Slope(gym.Env):
 
 
 def make_agent(kind, **options):
+    """Return a small agent of one of `KINDS`, a class and a case such as "SDNNQLambda, vector"."""
     name, comma, case = kind.partition(",")
     cls = getattr(agents, name)
     approximator, learning = SETTINGS[cls]
@@ -216,7 +217,7 @@ def make_agent(kind, **options):
 
 
 def trained(agent, n_steps=7):
-    """The agent after some steps; an exploring act comes last."""
+    """Train the agent for some steps, and keep its next action as ``agent.last``."""
     generator = np.random.default_rng(1)
     for _ in range(n_steps):
         action = agent.act(HERE)
@@ -227,7 +228,7 @@ def trained(agent, n_steps=7):
 
 
 def memory(agent):
-    """All that the agent is."""
+    """Return the description of an agent and the bytes of its state, to compare them."""
     arrays = {name: (a.dtype.str, a.shape, a.tobytes()) for name, a in agent.state().items()}
     return repr(agent.description()), arrays
 
@@ -267,7 +268,7 @@ def action_fault(agent, action):
 
 def state_fault(agent):
     for name, array in agent.state().items():
-        if name.startswith("warm_up."):  # which remembers what was seen as it was
+        if name.startswith("warm_up."):  # observations, which may be infinite
             continue
         if array.dtype.kind == "f" and not np.isfinite(array).all():
             return f"{name} is not finite"
@@ -275,7 +276,7 @@ def state_fault(agent):
 
 
 class ReusedAgent:
-    """A trained agent for one cell after the other, as long as all of them are refused."""
+    """A trained agent that cells share until one of them is accepted, which may change it."""
 
     def __init__(self, kind):
         self._kind = kind
@@ -297,9 +298,9 @@ class ReusedAgent:
 
 
 def judged(parameter, call, reused=None, value=None):
-    """Run a cell: ``call`` gives what is wrong with an accepted value. Give the fault, or "".
+    """Run ``call``, which returns the fault of an accepted value or ""; return the cell's fault.
 
-    A message must show what ``value`` makes, too.
+    A refusal must name the parameter, show ``value()``, and leave the agent ``reused`` unchanged.
     """
     try:
         fault = call() or ""
@@ -333,7 +334,7 @@ def message_fault(error, parameter, value):
 
 
 def is_shown(value, message):
-    """Whether a message shows a value, or says after "got" what kind of value, or how many."""
+    """Return whether a message has a value, or after "got" its type, its shape or its size."""
     if shown(value) in message:
         return True
     try:
@@ -342,9 +343,9 @@ def is_shown(value, message):
         got = message.partition("got ")[2]
         return any(word in got for word in (type(value).__name__, "more"))
     message = re.sub(r"0x[0-9a-f]+", "0x", message.lower())
-    if isinstance(value, gym.Space) or "bytes" in message:  # what follows from it is too much
+    if isinstance(value, gym.Space) or "bytes" in message:  # its consequence is named instead
         return True
-    if message.endswith("must be given"):  # a part of it is missing, which has no value
+    if message.endswith("must be given"):  # the missing part of it has no value
         return True
     items = [value, *(value if isinstance(value, str | bytes | list | np.ndarray) else ())]
     forms = {form for item in items for form in (repr(item), str(item))}
@@ -376,13 +377,13 @@ def parameters_of(function):
 
 
 def bad_cells(label, parameters, cell, values=BAD):
-    """Yield ``cell(parameter, value)`` for all parameters and bad values, which the label names."""
+    """Yield cells for all bad values ``value()``; ``cell(parameter, value)`` is their function."""
     for parameter in parameters:
         for word, value in values.items():
             yield label.format(f"{parameter}={word}"), cell(parameter, value)
 
 
-# The rows of the matrix.
+# The rows of the matrix: functions that yield cells, each after functions that make their run().
 
 
 def constructor_cells(name):
@@ -400,7 +401,7 @@ def _constructor_cell(name, parameter, value):
 
 
 def setting_cells(name):
-    """Fields of approximator and learning, of one dimension and of several."""
+    """Yield cells of the settings of approximator and learning, for one action and for two."""
     for case in ("", ", vector"):
         for part, settings in zip(
             ("approximator", "learning"), SETTINGS[getattr(agents, name)], strict=True
@@ -443,7 +444,7 @@ def method_cells(kind):
     for name, method in inspect.getmembers(type(reused.agent)):
         if name.startswith("_") or name == "rebuild":  # rebuild: see the cells of files
             continue
-        if kind != KINDS[0] and name in ("train", "save", "load"):  # the same of all kinds
+        if kind != KINDS[0] and name in ("train", "save", "load"):  # equal for all kinds
             continue
         if isinstance(method, property) and method.fset is not None:
             parameters = [name]
@@ -462,7 +463,7 @@ def _method_cell(reused, kind, name, parameters, parameter, value):
     def run():
         agent = reused.agent
         if ", warm-up" in kind and (name in READERS or name.startswith("plot_")):
-            return ""  # which has no values yet
+            return ""  # an agent that is warming up has no values
         given = arguments(agent, parameters) | {parameter: value()}
 
         def call():
@@ -477,7 +478,7 @@ def _method_cell(reused, kind, name, parameters, parameter, value):
 
 
 def arguments(agent, parameters):
-    """Good arguments of whatever is called; a new required parameter wants one here."""
+    """Return good arguments for these parameters; a new required parameter needs one here."""
     env = Slope(agent.action_space, ENOUGH)
     path = Path("agent").absolute()
     if "path" in parameters:
@@ -534,7 +535,7 @@ def result_fault(agent, result, given):
         return action_fault(agent, result)
     if isinstance(result, agents.TrainingResult):
         return state_fault(agent) or ("" if np.isfinite(result.returns).all() else "returns")
-    is_observation = np.array_equal(result, given.get("observation"))  # as it came, in its units
+    is_observation = np.array_equal(result, given.get("observation"))  # which may be NaN
     if isinstance(result, float | np.ndarray) and not is_observation:
         return "" if np.isfinite(result).all() else f"gave {result}"
     return state_fault(agent)
@@ -622,7 +623,7 @@ def file_cells(kind):
 
 
 def leaves(data, place=()):
-    """The places of a file's description: tables, lists and values."""
+    """Yield the keys, as tuples, of all tables, lists and values of a file's description."""
     if place:
         yield place
     items = data.items() if isinstance(data, dict) else ()
@@ -633,6 +634,7 @@ def leaves(data, place=()):
 
 
 def replaced(data, place, value):
+    """Return a copy of the data with another value at a tuple of keys; without it if it is ... ."""
     key, *rest = place
     changed = dict(data) if isinstance(data, dict) else list(data)
     if rest:
@@ -656,7 +658,7 @@ def _file_cell(description, arrays, kind):
             except OverflowError:
                 continue  # values as large as can be were in the file
             except ValueError as error:
-                words = (str(path), "env must", "repeat_episodes must")  # what was asked for
+                words = (str(path), "env must", "repeat_episodes must")  # refused by their names
                 fault = "" if any(word in str(error) for word in words) else str(error)
             if fault:
                 return fault

@@ -1,7 +1,8 @@
 """A matrix of bad options, made from the commands: a new option is covered by itself.
 
-A cell gives one bad text to one option or argument. The command must end with exit code 2 and name
-it, end with exit code 1 and a message that has the text (a file that is not there), or work.
+A cell (a name, and a function that returns a fault) gives one bad text to one option or argument.
+The command must end with exit code 2 and name it, end with exit code 1 and a message that has the
+text (a missing file), or work.
 """
 
 import contextlib
@@ -58,7 +59,7 @@ LEFT_OUT = {"bench"}
 
 @functools.cache
 def run_folder():
-    """A run that is done, which each process makes once."""
+    """Return the folder of a finished run, which is trained once in each process."""
     run = os.path.join(tempfile.mkdtemp(), "run")
     settings = ["n_pattern_units=20", "n_hidden_units=60", "n_active_units=20"]
     options = [word for setting in settings for word in ("--set", f"approximator.{setting}")]
@@ -71,8 +72,8 @@ def run_folder():
 
 def parameters_of(command):
     """Return all parameters but the option for help."""
-    made = main.commands[command]
-    return [parameter for parameter in made.get_params(Context(made)) if parameter.name != "help"]
+    parameters = main.commands[command].get_params(Context(main.commands[command]))
+    return [parameter for parameter in parameters if parameter.name != "help"]
 
 
 def command_cells(command):
@@ -84,7 +85,7 @@ def command_cells(command):
 
 
 def arguments_of(command, parameter, text):
-    """The good arguments and options, with the text in the place of one of them."""
+    """Return the good arguments and options, with the text as the value of one of them."""
     arguments, options = (list(words) for words in COMMANDS[command])
     if isinstance(parameter, Argument):
         positional = [other for other in parameters_of(command) if isinstance(other, Argument)]
@@ -112,33 +113,31 @@ def fault_of(result, parameter, text):
         return f"raised {type(result.exception).__name__}: {str(result.exception)[:200]}"
     if result.exit_code == 0:
         return "printed NaN" if "nan" in result.stdout.lower() and text != "nan" else ""
-    told = result.stderr
+    message = result.stderr
     if result.exit_code not in (1, 2):
-        return f"exit code {result.exit_code}: {told[-200:]}"
-    if result.exit_code == 1:  # what the text names is not there
-        return "" if text[:50] in told or is_named(parameter, told) else f"told {told[-200:]}"
-    if not is_named(parameter, told):
-        return f"did not name {parameter.opts}: {told[-200:]}"
-    return "" if is_shown(text, told) else f"did not show the value: {told[-200:]}"
+        return f"exit code {result.exit_code}: {message[-200:]}"
+    if result.exit_code == 1:  # the file or run that the text names is missing
+        is_clear = text[:50] in message or is_named(parameter, message)
+        return "" if is_clear else f"printed {message[-200:]}"
+    if not is_named(parameter, message):
+        return f"did not name {parameter.opts}: {message[-200:]}"
+    return "" if is_shown(text, message) else f"did not show the value: {message[-200:]}"
 
 
-def is_named(parameter, told):
+def is_named(parameter, message):
+    """Return whether a message has an option, an argument, or the choices of an argument."""
     shown = parameter.metavar or parameter.name.upper()
-    names = {
-        *parameter.opts,
-        *(option.strip("-") for option in parameter.opts),
-        shown,
-        shown.lower(),
-    }
+    without_dashes = (option.strip("-") for option in parameter.opts)
+    names = {*parameter.opts, *without_dashes, shown, shown.lower()}
     names |= {f"[{'|'.join(getattr(parameter.type, 'choices', ()))}]"} - {"[]"}
-    return any(re.search(rf"(?<![\w-]){re.escape(name)}(?!\w)", told) for name in names)
+    return any(re.search(rf"(?<![\w-]){re.escape(name)}(?!\w)", message) for name in names)
 
 
-def is_shown(text, told):
-    """Whether a message shows an option's text or number, unless no value of it would do."""
-    if not text.strip() or re.search(r"\bneeds?\b|does not take a value", told):
+def is_shown(text, message):
+    """Return whether a message has an option's text or number, or says that none is possible."""
+    if not text.strip() or re.search(r"\bneeds?\b|does not take a value", message):
         return True
     forms = {*text.split("="), repr(text), Path(text[:50]).stem}
     with contextlib.suppress(ValueError):
         forms.add(str(float(text)))
-    return any(form[:50] in told for form in forms)
+    return any(form[:50] in message for form in forms)

@@ -1,7 +1,6 @@
-"""Processors that have no C library here: programs that read and write by themselves.
+"""Compilers for microcontrollers without a C library, and an emulator of Linux programs for them.
 
-They are processors of microcontrollers whose instructions an emulator of Linux programs runs as
-well: what is tested is the compiled code, not a board.
+The programs call Linux themselves to read and write. Their compiled code is tested, not a board.
 """
 
 from c_policies import Target

@@ -1,4 +1,4 @@
-"""Boards that an emulator runs whole: their processor and memory map.
+"""Boards that QEMU emulates whole: their processor and memory map.
 
 Programs link as firmware does, at the chip's addresses and within its flash and RAM, of which 2 kB
 are the stack. They read and write by semihosting, as under a debugger. No board was used.

@@ -1,4 +1,4 @@
-"""Estimators whose predictions are made in C, and programs that compile and ask them."""
+"""Estimators exported as C headers, with docstrings of what they cover, and checks of the code."""
 
 import copy
 import functools
@@ -19,12 +19,12 @@ SIZES = (1.0, 2.5, -4.0, 0.0)
 
 
 def numbers(n_samples, seed, n_features=3):
-    """Uniform numbers, a fifth of the range beyond [0, 1] on either side."""
+    """Return uniform numbers in [-0.2, 1.2]."""
     return np.random.default_rng(seed).uniform(-0.2, 1.2, (n_samples, n_features))
 
 
 def lacking(n_samples, seed):
-    """Numbers of which some are missing, a constant column, and numbers as categories."""
+    """Return numbers of which some are missing, a constant column, and numbers as categories."""
     random = np.random.default_rng(seed)
     X = numbers(n_samples, seed, 4)
     X[:, 1] = 2.5
@@ -35,7 +35,7 @@ def lacking(n_samples, seed):
 
 
 def words(n_samples, seed):
-    """A word that may be missing or unknown, a number, a day of the week and an angle."""
+    """Return words that may be missing or unknown, numbers, days of the week and angles."""
     random = np.random.default_rng(seed)
     X = np.empty((n_samples, 4), object)
     X[:, 0] = random.choice([*COLORS, "pink", None], n_samples)
@@ -46,20 +46,20 @@ def words(n_samples, seed):
 
 
 def targets(X, n_outputs):
-    """Sums of functions of the columns, of one or several outputs."""
+    """Return functions of the samples, as a vector or as columns of several outputs."""
     table = np.array([[hash_of(value) for value in row] for row in X])
     waves = [np.sin((1 + k) * table).sum(axis=1) * 10.0**k for k in range(n_outputs)]
     return waves[0] if n_outputs == 1 else np.stack(waves, axis=1)
 
 
 def labels(X, n_classes):
-    """Numbers of classes: ranks of a target."""
+    """Return numbers of equally frequent classes, by the ranks of a target."""
     ranks = targets(X, 1).argsort().argsort()
     return ranks * n_classes // len(X)
 
 
 def hash_of(value):
-    """A number for a value of any type."""
+    """Return a number for a value of any type."""
     if value is None or value != value:
         return 9.0
     return float(len(value)) if isinstance(value, str) else float(value)
@@ -94,7 +94,7 @@ def plain_pairs():
 
 
 def wide_weights():
-    """Many or few weights of more than a byte, and a range of outputs tiny and far from 0."""
+    """Units with many or few weights of more than a byte, a tiny range of outputs far from 0."""
     X = numbers(200, 4, 2)
     y = 1e6 + 1e-3 * np.random.default_rng(0).normal(size=200)
     model = SDNNRegressor(n_output_units=9, **SMALL).fit(X, y)
@@ -108,7 +108,7 @@ def wide_weights():
 
 
 def two_classes():
-    """Several units for either class."""
+    """Two classes of several units."""
     model = SDNNClassifier(**SMALL, n_units_per_class=13)
     return model.fit(X := lacking(300, 5), labels(X, 2)), lacking
 
@@ -139,21 +139,22 @@ def one_pair():
 
 
 def widening():
-    """Outputs beyond the first range stretch it."""
+    """A range of outputs that learning widens."""
     model = SDNNRegressor(n_output_units=37, out_of_range="widen", **SMALL)
     return model.fit(X := numbers(300, 10), 0.1 * targets(X, 2)), numbers
 
 
 def averaging():
-    """A share of the units is corrected."""
+    """A share of corrected units below 1."""
     model = SDNNRegressor(n_output_units=37, correction_share=0.3, **SMALL)
     return model.fit(X := numbers(300, 11), targets(X, 1)), numbers
 
 
 def strict():
-    """Numbers and outputs beyond their range are refused."""
+    """Inputs and outputs that are refused because they are outside their ranges."""
     model = SDNNRegressor(n_output_units=20, out_of_range="error", **SMALL)
-    return model.fit(X := numbers(300, 12), 0.5 * targets(X, 1)), lambda n, s: 1.2 * numbers(n, s)
+    X = numbers(300, 12)
+    return model.fit(X, 0.5 * targets(X, 1)), lambda n, seed: 1.2 * numbers(n, seed)
 
 
 ESTIMATORS = {
@@ -166,7 +167,7 @@ ESTIMATORS = {
 
 @functools.cache
 def fitted(name):
-    """An estimator with this name, and a function that draws samples."""
+    """Return the estimator with this name, and a function that draws samples."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return (ESTIMATORS | SMALL_ESTIMATORS)[name]()
@@ -230,16 +231,14 @@ int main(void) {
 
 
 def rows_in_c(model, X):
-    """Samples as a program in C gets them: words as their numbers, missing values as NaN."""
+    """Return samples as C reads them: numbers for words, one more if unknown, NaN if missing."""
     X = np.array(X, object)
     for index, coding in enumerate(model.codings_):
         base = coding.base if isinstance(coding, WithMissing) else coding
-        known = list(getattr(base, "categories", None) or ())
-        if any(isinstance(category, str) for category in known):
-            X[:, index] = [
-                known.index(word) if word in known else np.nan if word is None else len(known)
-                for word in X[:, index]
-            ]
+        words = list(getattr(base, "categories", None) or ())
+        if any(isinstance(word, str) for word in words):
+            numbers = {word: number for number, word in enumerate(words)} | {None: np.nan}
+            X[:, index] = [numbers.get(word, len(words)) for word in X[:, index]]
     return X.astype(np.float64)
 
 
@@ -251,7 +250,7 @@ def compiled(folder, source, target, *options):
 
 
 def predictions(model, X):
-    """Outputs as the program writes them, or the class and the scores of all classes."""
+    """Return outputs as the program writes them, or the class and the scores of all classes."""
     if isinstance(model, SDNNRegressor):
         return model.predict(X).reshape(len(X), -1)
     winners = np.searchsorted(model.classes_, model.predict(X))
@@ -264,20 +263,19 @@ def predictions(model, X):
 
 
 def check_predictions(name, target, folder, n_samples, *options):
-    """Compare the bits of predictions."""
+    """Check that the compiled predictions have the bits of the estimator's."""
     model, draw = fitted(name)
     export_estimator_header(model, folder / "model.h")
     X = draw(n_samples, 11)
     written = run(*compiled(folder, PREDICT, target, *options), input=rows_in_c(model, X).tobytes())
     expected = predictions(model, X)
     assert len(np.unique(expected[:, 0])) > 1
-    np.testing.assert_array_equal(
-        np.frombuffer(written, np.int64).reshape(expected.shape), expected.view(np.int64)
-    )
+    bits = np.frombuffer(written, np.int64).reshape(expected.shape)
+    np.testing.assert_array_equal(bits, expected.view(np.int64))
 
 
 def targets_to_learn(model, X):
-    """Outputs, some beyond those of `fit`, or the numbers of classes."""
+    """Return targets, some outside the range of `fit`, or the numbers of classes."""
     if isinstance(model, SDNNClassifier):
         return labels(X, len(model.classes_)).astype(np.float64)[:, None]
     y = targets(X, model.n_outputs_).reshape(len(X), -1)
@@ -287,7 +285,10 @@ def targets_to_learn(model, X):
 
 
 def learned_in_python(model, X, y):
-    """Learn samples; return the rows that the program writes, with NaN for those refused."""
+    """Learn samples; return what the program writes for each: its predictions, and 1 if learned.
+
+    Predictions are NaN where the sample is refused.
+    """
     n_results = predictions(model, X[:1]).shape[1]
     rows = np.full((len(X), n_results + 1), np.nan)
     rows[:, -1] = 0
@@ -308,7 +309,7 @@ def learned_in_python(model, X, y):
 
 
 def check_learning(name, target, folder, n_samples, *options):
-    """Compare the bits of predictions, weights, thresholds and ranges while samples are learned."""
+    """Check that a compiled learner has the bits of predictions, weights, thresholds and ranges."""
     fitted_model, draw = fitted(name)
     model = copy.deepcopy(fitted_model)
     X = draw(n_samples, 12)
@@ -323,21 +324,17 @@ def check_learning(name, target, folder, n_samples, *options):
         expected = learned_in_python(model, X, y)
     assert np.any(before != model.weights_)
     assert expected[:, -1].mean() > 0.2
-    written = run(
-        *compiled(folder, LEARN, target, *options),
-        input=np.hstack([rows_in_c(model, X), y]).tobytes(),
-    )
+    command = compiled(folder, LEARN, target, *options)
+    written = run(*command, input=np.hstack([rows_in_c(model, X), y]).tobytes())
     results = np.frombuffer(written, np.float64, expected.size).reshape(expected.shape)
-    is_written = ~np.isnan(expected).any(axis=1)
+    is_predicted = ~np.isnan(expected).any(axis=1)
     np.testing.assert_array_equal(results[:, -1], expected[:, -1])
-    np.testing.assert_array_equal(
-        results[is_written].view(np.int64), expected[is_written].view(np.int64)
-    )
-    assert not np.isnan(results[is_written]).any()
-    rest = written[8 * expected.size :]
-    weights = np.frombuffer(rest, np.int16, model.weights_.size)
+    results, expected = results[is_predicted], expected[is_predicted]
+    np.testing.assert_array_equal(results.view(np.int64), expected.view(np.int64))
+    state = written[8 * is_predicted.size * expected.shape[1] :]  # after 8 bytes for each result
+    weights = np.frombuffer(state, np.int16, model.weights_.size)
     np.testing.assert_array_equal(weights, model.weights_.T.reshape(-1))
-    thresholds = np.frombuffer(rest[weights.nbytes :], np.int32, len(model.thresholds_))
+    thresholds = np.frombuffer(state[weights.nbytes :], np.int32, len(model.thresholds_))
     np.testing.assert_array_equal(thresholds, model.thresholds_)
-    ranges = rest[weights.nbytes + thresholds.nbytes :]
+    ranges = state[weights.nbytes + thresholds.nbytes :]
     assert ranges == getattr(model, "output_range_", np.empty(0)).tobytes()

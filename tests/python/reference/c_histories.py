@@ -1,4 +1,4 @@
-"""Agents whose states include earlier observations, and programs in C that act as they do."""
+"""Agents whose states include earlier observations, exported as C headers, and their checks."""
 
 import functools
 from dataclasses import replace
@@ -42,7 +42,7 @@ def warmed_up(agent, n_steps=WARM_UP_STEPS):
 
 
 def element_of(space, variables):
-    """Return an observation of a space from its variables, of which the largest is a symbol."""
+    """Return an observation from flat variables; a symbol is the index of its largest variable."""
     if not isinstance(space, gym.spaces.Tuple):
         return variables
     parts, first = [], 0
@@ -80,7 +80,7 @@ def averages():
 
 
 def observer():
-    """A cosine and a sine, and torques that are numbers of the model."""
+    """A cosine and a sine, and torques that the observer uses as numbers."""
     config = replace(SMALL, n_actions=11, action_window=2, averaging_interval=0)
     settings = {"angle_pairs": [(0, 1)], "approximator": config, **_ranges(1.0, 1.0, 8.0)}
     learning = QLambdaConfig(tie_rule="lowest", epsilon=0.2, schedule_steps=0)
@@ -103,7 +103,7 @@ def actor_averages():
 
 
 def actor_observer():
-    """An actor-critic with an observer that has numbers of two torques and an angle."""
+    """An actor-critic with an observer that uses two torques, and an angle."""
     config = replace(SMALL, n_actions=9)
     spaces = box(np.pi, 2.0), box(2.0, 0.7)
     settings = {"angles": [0], "approximator": config, **_ranges(np.pi, 2.0)}
@@ -111,7 +111,7 @@ def actor_observer():
 
 
 def actor_observer_of_levels():
-    """An actor-critic with an observer that tells actions apart."""
+    """An actor-critic with an observer that uses which of the discrete actions was chosen."""
     spaces = box(1.0, 2.0, 1.0), gym.spaces.MultiDiscrete([3, 4])
     return _agent(SDNNActorCritic, "observer", spaces, seed=7, **_ranges(1.0, 2.0, 1.0))
 
@@ -174,12 +174,12 @@ GREEDY = {
 
 @functools.cache
 def policy(name):
-    """Return the agent after some learning."""
+    """Return the trained agent with this name."""
     return warmed_up(POLICIES[name](), 400)
 
 
 def steps_of(agent, n, seed):
-    """Episodes of readings, some outside the ranges; the first column is 1 where one begins."""
+    """Return rows: 1 where an episode begins, else 0, and observations, some outside the ranges."""
     random = np.random.default_rng(seed)
     size = gym.spaces.flatdim(agent.observation_space)
     rows, now = [], None
@@ -223,10 +223,11 @@ def check_policy(name, kind, target, folder, n_steps=3000):
     """Check that a program takes the agent's actions in episodes."""
     agent = policy(name)
     header = export_c_header(agent, folder / "policy.h")
-    one, function = agent.n_dimensions == 1, GREEDY[kind]
+    function = GREEDY[kind]
     if lies_between(agent):
         function, kind = "policy_place", "int32_t"
-    call = f"action[0] = {function}(&episode, x)" if one else f"{function}(&episode, x, action)"
+    has_one = agent.n_dimensions == 1
+    call = f"action[0] = {function}(&episode, x)" if has_one else f"{function}(&episode, x, action)"
     define = "" if kind == "int32_t" else "#define POLICY_USE_FLOAT"
     (folder / "main.c").write_text(DRIVER.format(define=define, type=kind, call=call))
     command = target.compile(folder / "main.c", *STRICT, "-O2")

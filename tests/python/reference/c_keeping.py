@@ -1,4 +1,4 @@
-"""Programs in C in which agents are stored while the power is cut, and keep their best policy."""
+"""Programs in C that store agents while the power is cut, or keep an agent's best policy."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ def compiled(source, agent, folder, target, *options):
 
 
 def cut_power(make, folder, target, n_states, stride, *options):
-    """Return the number of cuts, and of states lost, wrong, not stored, and of violations."""
+    """Run power_cuts.c; return its counts: cuts, states lost, wrong or not stored, violations."""
     agent = make()
     is_vector = agent.n_dimensions > 1
     act = (
@@ -84,7 +84,7 @@ def check_best(make, target, folder, *options):
     header = c_header(agent, "agent", learning=True)
     run_agent(agent, lines_of(agent, 400, 1, header.fraction_bits), header.fraction_bits)
     kept = save_image(agent)
-    later = make()
+    later = make()  # goes on learning, so that its policy differs from the kept one
     load_image(later, kept)
     run_agent(later, lines_of(later, 900, 2, header.fraction_bits), header.fraction_bits)
     n = agent.n_dimensions

@@ -1,4 +1,4 @@
-"""Kernel estimators whose predictions are made in C, and their sums in the order of C."""
+"""Kernel estimators exported as C headers, with docstrings of what they cover, and checks."""
 
 import functools
 import warnings
@@ -15,14 +15,14 @@ from sdnn.export import export_estimator_header
 
 
 def all_pairs():
-    """Missing values, numbers as categories, two outputs, a kernel of degree 3."""
+    """Cover missing values, numbers as categories, two outputs, and a kernel of degree 3."""
     coding = [(WithMissing(base=Symbolic(categories=(1.0, 2.5, -4.0, 0.0))), [3])]
     model = SDNNKernelRidge(coding, inputs="all", degree=3)
     return model.fit(X := lacking(120, 1), targets(X, 2)), lacking
 
 
 def listed_pairs():
-    """Words, quantiles, a circle whose correlations differ along diagonals, a plain pattern."""
+    """Cover words, quantiles, an input without a partner, and an angle with uneven correlations."""
     coding = [
         (WithMissing(base=Symbolic(categories=("blue", "gr\u00fcn", "red"))), [0]),
         (RandomInverse(spacing="quantile"), [1]),
@@ -35,7 +35,7 @@ def listed_pairs():
 
 
 def directions():
-    """A function of a mixture of features, which becomes an input."""
+    """Cover an input that is a mixture of features."""
     X = numbers(200, 3, 4)
     y = np.sin(3 * X @ [1.0, -1.0, 0.5, 0.7])
     model = SDNNKernelRidge().fit(X, y)
@@ -44,13 +44,13 @@ def directions():
 
 
 def low_rank():
-    """Three classes, fewer components than samples."""
+    """Cover three classes, and fewer components than samples."""
     model = SDNNKernelClassifier(max_components=40, inputs="all", random_state=0)
     return model.fit(X := numbers(120, 4), labels(X, 3)), numbers
 
 
 def two_inputs():
-    """Two classes, of two inputs."""
+    """Cover two classes and two inputs."""
     model = SDNNKernelClassifier(inputs="all", degree=1)
     X = numbers(80, 5, 2)
     return model.fit(X, labels(X, 2)), lambda n_samples, seed: numbers(n_samples, seed, 2)
@@ -64,14 +64,14 @@ KERNEL_ESTIMATORS = {
 
 @functools.cache
 def fitted_kernel(name):
-    """An estimator of `KERNEL_ESTIMATORS`, and a function that draws samples."""
+    """Return an estimator of `KERNEL_ESTIMATORS`, and a function that draws samples."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return KERNEL_ESTIMATORS[name]()
 
 
 def outputs_in_order(model, X):
-    """Outputs with every sum in the order of features and of samples."""
+    """Return outputs whose sums have the order of the C code, and so its bits, unlike NumPy's."""
     inputs = model._inputs
     table = X[:, inputs.features]
     if len(inputs.directions):
@@ -83,7 +83,7 @@ def outputs_in_order(model, X):
 
 
 def check_kernel(name, target, folder, n_samples, *options):
-    """Compare the bits of outputs with those of sums in order, and closely with predictions."""
+    """Check that outputs in C have the bits of sums in order, and are close to predictions."""
     model, draw = fitted_kernel(name)
     header = export_estimator_header(model, folder / "model.h")
     X = draw(n_samples, 11)

@@ -1,4 +1,4 @@
-"""Agents that learn in C, and programs that let them live beside the library's."""
+"""Agents that learn in C, with docstrings of what they cover, and checks of their bits."""
 
 import functools
 import subprocess
@@ -75,7 +75,7 @@ def states():
 
 
 def network():
-    """SDNN-C as recommended: five-step targets, a range that follows the returns."""
+    """SDNN-C of the preset "small": five-step targets, a range that follows the returns."""
     learning = replace(SDNNQLearning.presets["small"].learning, epsilon=0.1, start_steps=20)
     config = replace(NETWORK, n_hidden_units=90)
     return SDNNQLearning(
@@ -94,7 +94,7 @@ def paper_rule():
 
 
 def small_steps():
-    """Rounding away, an angle, two inputs, a range from 0 to 1, few weights fit."""
+    """Rounding away, an angle, two inputs, a range from 0 to 1, and weights that reach a limit."""
     paper = SDNNQLearning.presets["paper"].learning
     learning = replace(paper, learning_rate=0.3, tie_rule="lowest", n_steps=3)
     config = replace(
@@ -113,7 +113,7 @@ def small_steps():
 
 
 def few_pairs():
-    """Five inputs in few pairs, uniform weights, wide patterns, no termination beyond."""
+    """Five inputs in few pairs, uniform initial weights, and wide patterns."""
     config = replace(
         NETWORK, max_pairs=10, initial_weights="uniform", initial_weight_limit=3.0,
         n_pattern_units=70,
@@ -232,7 +232,7 @@ int main(void) {
 
 
 def index_without_draw(agent, observation, d, index):
-    """The index of a greedy action, or its place, where C takes the middle and the agent draws."""
+    """Return the index (or `place_of`) of a greedy action in C: the middle of ties, not a draw."""
     is_actor = isinstance(agent, SDNNActorCritic)
     if not is_actor and agent.learning.tie_rule != "uniform":
         return index
@@ -253,16 +253,16 @@ def index_without_draw(agent, observation, d, index):
 
 
 def generator_of_greedy_ties(agent):
-    """The name of the random generator that greedy actions draw from in Python, and its state."""
+    """Return the name and the state of the random generator of greedy actions in Python."""
     state = agent._state_of("agent")
     name = next(n for n in ("policy.evaluation_ties.words", "ties.words") if n in state)
     return name, state[name].copy()
 
 
 def run_agent(agent, lines, fraction_bits):
-    """The indices of the actions that the library's agent takes for the lines.
+    """Return the indices of the actions that the library's agent takes for the lines.
 
-    Greedy actions draw nothing in C: the agent's generator for them is set back.
+    Greedy actions draw no random numbers in C: the agent's generator for them is set back.
     """
     n, scale = (lines.shape[1] - 3) // 2, 2.0**fraction_bits
     actions = []
@@ -336,7 +336,7 @@ def build(folder, agent, target, *options, durations=False):
 
 
 def run_program(command, image, lines, n_dimensions):
-    """The actions and the image that the program ends with."""
+    """Run a program; return its actions, and the image with which it ends."""
     done = subprocess.run(
         [str(word) for word in command],
         input=image + np.ascontiguousarray(lines).tobytes(),
@@ -360,7 +360,7 @@ def timed_lines_of(name, agent, n_steps, seed, fraction_bits):
 
 @functools.cache
 def recorded_steps(name, n_steps, fraction_bits):
-    """Lines, the first image of the library's agent, its actions and its last image."""
+    """Return lines, the first image of the library's agent, its actions and its last image."""
     agent = LEARNERS[name]()
     lines = timed_lines_of(name, agent, n_steps, 1, fraction_bits)
     initial_image = save_image(agent)

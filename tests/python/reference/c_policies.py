@@ -1,4 +1,4 @@
-"""Agents whose policy becomes a C header, and programs that compile and ask it."""
+"""Agents exported as C headers, with docstrings of what they cover, and checks of the actions."""
 
 import functools
 import subprocess
@@ -68,7 +68,7 @@ def program(folder, source, compiler, *options):
 
 
 def learned(agent, n_steps=300, seed=1):
-    """The agent after some random transitions."""
+    """Let the agent learn random transitions, and return it."""
     random = np.random.default_rng(seed)
     space = agent.observation_space
     low, high = np.maximum(space.low, -5.0), np.minimum(space.high, 5.0)
@@ -135,22 +135,23 @@ def pairs_agent():
 
 
 def lone_agent():
-    """A single variable, which is two inputs, all windows, and a range of values given."""
+    """A single variable, which is two inputs, all windows, and a fixed range of values."""
     approximator = replace(SMALL, n_actions=0, u_low=3, q_low=-0.3, q_high=0.1)
-    own = learning(tie_rule="lowest", value_range="fixed")
-    return SDNNQLearning(box(3.0), box(1.0), approximator=approximator, learning=own, seed=5)
+    fixed = learning(tie_rule="lowest", value_range="fixed")
+    return SDNNQLearning(box(3.0), box(1.0), approximator=approximator, learning=fixed, seed=5)
 
 
 def tables_agent():
-    """Codes of its own, wide patterns, and weights of more than a byte."""
+    """Tables of codes that the user gives, wide patterns, and weights of more than a byte."""
     tables = [RandomInverse(n_bins=n, n_flipped=9).patterns(300, seed=n) for n in (40, 7)]
     agent = SDNNQLearning(
         box(1.0, 1.0), box(2.0), approximator=replace(SMALL, n_pattern_units=300),
         learning=learning(tie_rule="middle"), tables=tables, seed=6,
     )  # fmt: skip
+    state = [0.9, -0.9]
     for step in range(800):
-        where = [0.9, -0.9]
-        agent.learn(Transition(where, [[2.0], [-2.0]][step % 2], step % 4 // 2, where, True))
+        action, reward = [[2.0], [-2.0]][step % 2], step % 4 // 2
+        agent.learn(Transition(state, action, reward, state, True))
     return agent
 
 
@@ -164,14 +165,15 @@ def symbols_agent():
     space.seed(7)
     agent.action_space.seed(7)
     for _ in range(300):
-        seen, action = space.sample(), agent.action_space.sample()
-        reward = float(np.sin(2.0 * seen[0] + seen[1][0] + seen[2]) + random.normal())
-        agent.learn(Transition(seen, action, reward, space.sample(), True))
+        (symbol, (number,), other_symbol), action = space.sample(), agent.action_space.sample()
+        observation = symbol, [number], other_symbol
+        reward = float(np.sin(2.0 * symbol + number + other_symbol) + random.normal())
+        agent.learn(Transition(observation, action, reward, space.sample(), True))
     return agent
 
 
 def partners_agent():
-    """Five variables, of which each is paired with two, in another way in each dimension."""
+    """Five variables, of which each is paired with two others, which differ by dimension."""
     return SDNNQLearning(
         box(1.0, 2.0, 3.0, 4.0, 5.0), box(1.0, 2.0), approximator=replace(SMALL, max_pairs=10),
         learning=learning(tie_rule="lowest"), seed=8,
@@ -231,12 +233,12 @@ AGENTS = {
 
 @functools.cache
 def agents():
-    """An agent of each kind, which has learned."""
+    """Return trained agents by the names in `AGENTS`."""
     return {name: learned(make()) for name, make in AGENTS.items()}
 
 
 def observations_of(agent, n, seed=0):
-    """Random ones, some outside the ranges, many where a bin begins or next to it."""
+    """Return random observations, some outside the ranges, many at or next to a bound of a bin."""
     random = np.random.default_rng(seed)
     low, high = agent.observation_space.low, agent.observation_space.high
     low, high = low.astype(float), high.astype(float)
@@ -253,7 +255,7 @@ def observations_of(agent, n, seed=0):
 
 @dataclass(frozen=True)
 class Expected:
-    """The queries, and in each dimension the actions that tie and the agent's own."""
+    """Observations of a kind of numbers, and by dimension the actions that tie and the chosen."""
 
     kind: str
     given: np.ndarray
@@ -262,6 +264,7 @@ class Expected:
 
 
 def expected_of(agent, kind, given, observations):
+    """Return the agent's actions for observations, which programs read as the numbers ``given``."""
     tied, chosen = [], []
     has_policy = isinstance(agent, SDNNActorCritic)
     values_of = agent.action_probabilities if has_policy else agent.q_values
@@ -269,19 +272,18 @@ def expected_of(agent, kind, given, observations):
     for observation in observations:
         action = np.ravel(agent.act(observation, explore=False))
         values = [values_of(observation, d) for d in range(agent.n_dimensions)]
-        if has_policy:  # whose greedy actions lie between those of a box
+        if has_policy:  # the most probable ones; greedy actions may lie between those of a box
             action = [agent.actions_of(d)[q.argmax()] for d, q in enumerate(values)]
-        chosen.append(
-            [np.abs(agent.actions_of(d) - one).argmin().item() for d, one in enumerate(action)]
-        )
+        distances = [np.abs(agent.actions_of(d) - part) for d, part in enumerate(action)]
+        chosen.append([of_actions.argmin().item() for of_actions in distances])
         tied.append([set(np.flatnonzero(q >= q.max() - tolerance).tolist()) for q in values])
     return Expected(kind, given, tied, chosen)
 
 
 def all_expected(name, agent):
-    """10,000 observations, in double and single precision and in fixed point."""
+    """Return what is expected for observations in double and single precision and fixed point."""
     values = observations_of(agent, N_STATES)
-    if name == "pairs":  # whose bins differ right beside bounds: tested below
+    if name == "pairs":  # angles, whose bins differ right beside bounds
         values = np.random.default_rng(0).uniform(-1.2, 1.2, values.shape)
     doubles, floats, fixed = np.split(values, [N_STATES // 3, N_STATES // 3 * 2])
     floats = floats.astype(np.float32)
@@ -295,26 +297,27 @@ def all_expected(name, agent):
 
 
 def lies_between(agent):
-    """Whether greedy actions of the agent lie between those that it learns."""
+    """Return whether greedy actions of the agent lie between those that it learns."""
     return isinstance(agent, SDNNActorCritic) and isinstance(agent.action_space, gym.spaces.Box)
 
 
 def place_of(actions, action):
-    """The place of an action among actions at even distances, times 2^16."""
-    part = (float(action) - actions[0]) / (actions[-1] - actions[0])
-    return round(part * (len(actions) - 1) * 2**16)
+    """Return the fractional index of an action among evenly spaced ones, times 2^16."""
+    share = (float(action) - actions[0]) / (actions[-1] - actions[0])
+    return round(share * (len(actions) - 1) * 2**16)
 
 
 def check_actions(agent, expected, actions):
-    """Each one the agent's, or one of those among which it draws."""
-    n_unique = 0
-    for tied, chosen, came in zip(expected.tied, expected.chosen, actions, strict=True):
-        for among, own, action in zip(tied, chosen, came, strict=True):
-            assert action in among
-            if len(among) == 1 or getattr(agent.learning, "tie_rule", "uniform") != "uniform":
-                assert action == own
-                n_unique += 1
-    assert n_unique > len(actions) / 4
+    """Check that each action is the agent's, or one of the tied actions among which it draws."""
+    n_certain = 0
+    draws = getattr(agent.learning, "tie_rule", "uniform") == "uniform"
+    for all_tied, all_chosen, vector in zip(expected.tied, expected.chosen, actions, strict=True):
+        for tied, chosen, action in zip(all_tied, all_chosen, vector, strict=True):
+            assert action in tied
+            if len(tied) == 1 or not draws:
+                assert action == chosen
+                n_certain += 1
+    assert n_certain > len(actions) / 4
     assert len({tuple(action) for action in actions}) > 1
 
 
@@ -361,14 +364,14 @@ int main(int argc, char **argv) {
 
 
 def write_policy(folder, agent, *, floats=True, **options):
-    """The header, and a source file that makes its functions callable from others."""
+    """Write the header and a source file that makes its functions callable from others."""
     header = export_c_header(agent, folder / "policy.h", **options)
-    one = agent.n_dimensions == 1
+    returns_action = agent.n_dimensions == 1
     functions = {
         "fixed": "policy_greedy", "double": "policy_greedy_double", "float": "policy_greedy_float",
     }  # fmt: skip
     calls = {
-        kind: f"a[0] = {function}(x);" if one else f"{function}(x, a);"
+        kind: f"a[0] = {function}(x);" if returns_action else f"{function}(x, a);"
         for kind, function in functions.items()
     }
     define = "#define POLICY_USE_FLOAT" if floats else ""
@@ -379,15 +382,15 @@ def write_policy(folder, agent, *, floats=True, **options):
 
 
 def compile_policy(folder, target, *options):
-    """The policy's object, compiled on its own, without a C library."""
-    done = folder / "policy.o"
-    alone = (*STRICT, *ALONE, *target.options, *options)
-    run(target.compiler, *alone, "-c", folder / "policy.c", "-o", done)
-    return done
+    """Compile the policy without a C library; return its object file."""
+    object_file = folder / "policy.o"
+    all_options = (*STRICT, *ALONE, *target.options, *options)
+    run(target.compiler, *all_options, "-c", folder / "policy.c", "-o", object_file)
+    return object_file
 
 
 def build(folder, target):
-    """The program that answers observations with actions, as a command."""
+    """Compile the program that answers observations with actions; return its command."""
     return target.compile(folder / "driver.c", "-O1", compile_policy(folder, target, "-O2"))
 
 
@@ -398,53 +401,50 @@ def actions_of(command, kind, observations, n_dimensions):
 
 @functools.cache
 def expectations(name):
-    """The actions of an agent, computed once for all targets."""
+    """Return what is expected of an agent, computed once for all targets."""
     return all_expected(name, agents()[name])
 
 
 def check_all_actions(name, target, folder):
-    """A policy answers as its agent, compiled by and run on the target."""
+    """Check that a policy, compiled for and run on the target, acts as its agent."""
     agent = agents()[name]
     write_policy(folder, agent)
     command = build(folder, target)
     for expected in expectations(name):
-        came = actions_of(command, expected.kind, expected.given, agent.n_dimensions)
-        check_actions(agent, expected, came)
+        actions = actions_of(command, expected.kind, expected.given, agent.n_dimensions)
+        check_actions(agent, expected, actions)
 
 
 def check_symbols(target, folder):
-    """Symbols are readings of one and zero."""
+    """Check a policy that reads symbols as a number for each value, which are one and zeros."""
     agent = symbols_agent()
     header = write_policy(folder, agent)
     command = build(folder, target)
     agent.observation_space.seed(3)
-    seen = [agent.observation_space.sample() for _ in range(1000)]
-    told = np.array([agent.flat_observation(one) for one in seen])
+    observations = [agent.observation_space.sample() for _ in range(1000)]
+    flat = np.array([agent.flat_observation(observation) for observation in observations])
     for kind, given in (
-        ("double", told),
-        ("float", told.astype(np.float32)),
-        ("fixed", np.round(told * 2.0**header.fraction_bits).astype(np.int32)),
+        ("double", flat),
+        ("float", flat.astype(np.float32)),
+        ("fixed", np.round(flat * 2.0**header.fraction_bits).astype(np.int32)),
     ):
-        check_actions(
-            agent, expected_of(agent, kind, given, seen), actions_of(command, kind, given, 1)
-        )
+        expected = expected_of(agent, kind, given, observations)
+        check_actions(agent, expected, actions_of(command, kind, given, 1))
     assert "input 2: which of observation[4] to observation[7] is 1" in header.text
 
 
 def check_integer_path(name, target, folder):
-    """It needs no library, no floating point and no memory of its own."""
+    """Check that the integer policy needs no library, no floating point and no static memory."""
     agent = agents()[name]
     write_policy(folder, agent, floats=False)
     options = {
         "aarch64-linux-gnu-gcc": ["-mgeneral-regs-only"],
         "arm-linux-gnueabihf-gcc": ["-mcpu=cortex-m4", "-mfloat-abi=soft"],
     }.get(target.compiler, ["-mno-sse", "-mno-80387"])
-    done = compile_policy(folder, target, "-O2", *options)
-    assert run(target.prefix + "nm", "-u", done) == b""
-    sections = run(target.prefix + "objdump", "-h", done).decode()
-    sizes = {
-        words[1]: int(words[2], 16)
-        for words in map(str.split, sections.splitlines())
-        if len(words) > 3 and words[0].isdigit()
-    }
+    object_file = compile_policy(folder, target, "-O2", *options)
+    assert run(target.prefix + "nm", "-u", object_file) == b""
+    sections = run(target.prefix + "objdump", "-h", object_file).decode()
+    # Lines of sections: number, name, size in hexadecimal digits, ...
+    lines = [line.split() for line in sections.splitlines()]
+    sizes = {line[1]: int(line[2], 16) for line in lines if len(line) > 3 and line[0].isdigit()}
     assert sizes.get(".data", 0) == sizes.get(".bss", 0) == 0

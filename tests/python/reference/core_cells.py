@@ -1,7 +1,7 @@
-"""Cells about the classes and functions of the compiled core, found in the module itself.
+"""Cells (a name, and a function that returns a fault) about classes and functions of the core.
 
-An object that was never made must be refused wherever it is used; a bad value in the place of any
-argument must be refused by a typed error, or taken.
+An object whose ``__init__`` was not called must be refused wherever it is used; a bad value of any
+argument must be refused by a typed error, or accepted.
 """
 
 import contextlib
@@ -224,7 +224,7 @@ def never_made_cells():
 
 
 def _calls(name):
-    """Call a method with as many arguments as it wants, of which none is looked at."""
+    """Return a function that calls a method with zeros, as many as it has arguments."""
 
     def call(instance):
         for count in range(7):
@@ -233,7 +233,7 @@ def _calls(name):
             except TypeError as error:
                 if NOT_MADE in str(error):
                     raise
-        return None  # takes arguments of other types only, and has refused these
+        return None  # the method has refused the types of these arguments
 
     return call
 
@@ -250,19 +250,12 @@ def _refusal_cell(cls, use):
 
 
 def _general_cell(cls):
+    """Return a function that uses an object without ``__init__`` in ways that fit any object."""
+
     def run():
         instance = cls.__new__(cls)
-        uses = [
-            repr,
-            str,
-            hash,
-            bool,
-            len,
-            copy.copy,
-            copy.deepcopy,
-            lambda instance: instance == instance,
-        ]
-        uses += [lambda instance, p=p: pickle.dumps(instance, p) for p in range(6)]
+        uses = [repr, str, hash, bool, len, copy.copy, copy.deepcopy, lambda x: x == x]
+        uses += [lambda x, protocol=protocol: pickle.dumps(x, protocol) for protocol in range(6)]
         for use in uses:
             with contextlib.suppress(TypeError):
                 use(instance)
@@ -305,14 +298,11 @@ def _method_cell(name, method, good, parameter, value):
 
 
 def _judged(call):
-    """A refusal need not name the argument: the core's callers have named it before."""
+    """Return a fault if a result is not finite; a refusal need not name the argument."""
     try:
         result = call()
     except (*TYPED, IndexError, MemoryError):
         return ""
-    numbers = (
-        [item for item in np.atleast_1d(result) if isinstance(item, float)]
-        if (isinstance(result, float | np.ndarray))
-        else []
-    )
+    is_number = isinstance(result, float | np.ndarray)
+    numbers = [x for x in np.atleast_1d(result) if isinstance(x, float)] if is_number else []
     return "" if np.isfinite(numbers).all() else f"gave {result!r}"

@@ -12,7 +12,7 @@ import sdnn._core
 
 
 def _typed_config(found: re.Match[str]) -> str:
-    """The class of a configuration with the types of its fields, which its list of them has."""
+    """Return the stub of a configuration with types, from the attribute ``fields`` of its class."""
     text = found[0]
     hints = {name: hint for name, hint, *_ in getattr(sdnn._core, found[1]).fields}
     for name, hint in hints.items():
@@ -31,7 +31,7 @@ def _typed_config(found: re.Match[str]) -> str:
 
 
 def generate() -> str:
-    """The text that ``python/sdnn/_core.pyi`` should have for the installed core."""
+    """Return the text that ``python/sdnn/_core.pyi`` should have for the installed core."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "pybind11_stubgen", "sdnn._core", "--exit-code"]
         command += ["--enum-class-locations", ".+:sdnn._core"]
@@ -41,10 +41,10 @@ def generate() -> str:
         if process.returncode != 0:
             raise RuntimeError(process.stdout + process.stderr)
         text = (Path(folder) / "sdnn" / "_core.pyi").read_text()
-    # The tool invents an __all__ that the module does not have, and writes down its version.
+    # The tool adds an __all__ that the module does not have, and the value of its version.
     if not hasattr(sdnn._core, "__all__"):
         text = re.sub(r"^__all__.*?\]\n", "", text, flags=re.MULTILINE | re.DOTALL)
-    # It writes members of enumerations as Python's type checkers no longer take them.
+    # It writes members of enumerations in a form that type checkers no longer accept.
     text = re.sub(
         r"^    (\w+): typing\.ClassVar\[((?!tuple)\w+)\]$",
         lambda line: f"    {line[1]} = {getattr(sdnn._core, line[2])[line[1]].value}",

@@ -1,4 +1,7 @@
-"""Every reader of files, and every damage: what strangers may put in the place of a file."""
+"""Cells (a name, and a function that returns a fault) about readers of damaged or foreign files.
+
+A reader must read a file, or name it in an error, and need little time and memory.
+"""
 
 import functools
 import json
@@ -26,7 +29,7 @@ from mutated_files import (
 )
 from sdnn import libsdnn
 from sdnn.agents import JSONLines, SDNNQLearning, Training
-from sdnn.runs import Run
+from sdnn.runs import Run, config_file
 from sdnn.runs.errors import RunError
 from sdnn.support.files import read_file, write_file
 from sdnn.training.files import read_statistics
@@ -60,7 +63,8 @@ def read_scheduler_file(path):
 
 
 RUN = (
-    b'{"format": "%s", "environment": {"id": "Pendulum-v1"}, "goals": [{"at_step": 3, "steps": 9}]}'
+    b'{"format": "%b", "environment": {"id": "Pendulum-v1"}, "goals": [{"at_step": 3, "steps": 9}]}'
+    % config_file.FORMAT.encode()
 )
 
 READERS = {
@@ -78,10 +82,7 @@ READERS = {
         (ValueError, OSError),
     ),
     "configuration": Reader(
-        "config.json",
-        lambda: [RUN.replace(b"%s", format_of_runs().encode())],
-        lambda path: Run.open(path.parent),
-        (RunError,),
+        "config.json", lambda: [RUN], lambda path: Run.open(path.parent), (RunError,)
     ),
     "lines": Reader("rows.jsonl", lambda: [b'{"a": 1}\n' * 4], read_lines, (OSError,)),
     "scheduler": Reader(
@@ -91,18 +92,13 @@ READERS = {
 }  # fmt: skip
 
 CHECKED = ("agent", "training", "estimator")
-"""Whose every byte is covered by a checksum."""
+"""Kinds of files in which a checksum covers every byte."""
 
 
 def parameters_of(model):
+    """Return the text of parameters with which a model file of LIBSDNN begins, after its length."""
     length = int.from_bytes(model[:4], "little")
     return model[4 : 4 + length]
-
-
-def format_of_runs():
-    from sdnn.runs import config_file
-
-    return config_file.FORMAT
 
 
 @functools.cache
@@ -194,7 +190,7 @@ def damages(name):
 
 
 def changed(name, good):
-    """Yield contents that only this reader is harmed by."""
+    """Yield names and contents of files that are made for this reader."""
     if name.startswith("libsdnn"):
         text = good if name == "libsdnn parameters" else parameters_of(good)
         rest = b"" if name == "libsdnn parameters" else good[4 + len(text) :]
@@ -208,8 +204,8 @@ def changed(name, good):
         ):
             if old in text:
                 other = text.replace(old, new).replace(b":2]", b":10000]")
-                head = b"" if not rest else len(other).to_bytes(4, "little")
-                yield f"{new.decode()}", head + other + rest
+                length = b"" if not rest else len(other).to_bytes(4, "little")
+                yield new.decode(), length + other + rest
     if name in CHECKED:
         yield from of_other_types(good)
 
@@ -219,7 +215,7 @@ OTHER_TYPES = {1: ("F8_E4M3", "F8_E5M2", "BOOL"), 2: ("BF16", "F16", "U16"), 4: 
 
 
 def of_other_types(good):
-    """Yield files whose arrays have other types, under the right checksum."""
+    """Yield names and files in which one array has another type, with the right checksum."""
     length = int.from_bytes(good[:8], "little")
     header, data = json.loads(good[8 : 8 + length]), good[8 + length :]
     sizes = {"I8": 1, "U8": 1, "I16": 2, "I32": 4, "F32": 4, "I64": 8, "U64": 8, "F64": 8}
@@ -232,13 +228,13 @@ def of_other_types(good):
 
 
 def damage_cells(name):
-    """Cells of a reader: every damage is refused by name, or read, in little time and memory."""
+    """Yield a cell for every damage of a reader's file."""
     for word, damage, is_refused in damages(name):
-        yield f"{name}, {word}", functools.partial(tried, name, damage, is_refused)
+        yield f"{name}, {word}", functools.partial(read_damaged, name, damage, is_refused)
 
 
-def tried(name, damage, is_refused):
-    """Say what is wrong with how a reader takes a damage, or nothing."""
+def read_damaged(name, damage, is_refused):
+    """Read a damaged file; return the fault of its reader, or ""."""
     reader = READERS[name]
     path = Path.cwd() / reader.name
     damage(path)
@@ -246,7 +242,8 @@ def tried(name, damage, is_refused):
 
 
 def verdict(reader, path, is_refused):
-    Path("/proc/self/clear_refs").write_text("5")  # begin the highest memory anew
+    """Read a file; return the fault: time, memory, a wrongly accepted file, its error; or ""."""
+    Path("/proc/self/clear_refs").write_text("5")  # resets VmHWM, the highest resident memory
     before, began = resident("VmRSS"), time.process_time()
     error = None
     try:
@@ -260,14 +257,15 @@ def verdict(reader, path, is_refused):
         return f"took {n_bytes / MIB:.0f} MiB"
     if error is None:
         return "was read" if is_refused else ""
-    of_arguments = str(error).startswith(("env ", "evaluation_env ", "repeat_episodes "))
-    return (
-        "" if path.name in str(error) or of_arguments else f"does not name the file: {error!r:.200}"
-    )
+    names_argument = str(error).startswith(("env ", "evaluation_env ", "repeat_episodes "))
+    is_clear = path.name in str(error) or names_argument
+    return "" if is_clear else f"does not name the file: {error!r:.200}"
 
 
 def resident(name):
-    (line,) = (x for x in Path("/proc/self/status").read_text().splitlines() if x.startswith(name))
+    """Return the bytes of resident memory that Linux reports under a name."""
+    lines = Path("/proc/self/status").read_text().splitlines()
+    (line,) = (line for line in lines if line.startswith(name))
     return 1024 * int(line.split()[1])
 
 
@@ -280,7 +278,7 @@ VALUES = {
 
 
 def header_cells(name, number):
-    """Every value of a file's description, another one, under the right checksum."""
+    """Yield cells in which one value of a file's description is another, with a right checksum."""
     reader = READERS[name]
     path = Path(reader.name).absolute()
     path.write_bytes(reader.good()[number])
@@ -300,7 +298,8 @@ def _header_cell(name, arrays, description):
 
 
 def statistics():
-    numbers = {"dtype": "<f8", "shape": [2], "values": "AAAAAAAA8D8AAAAAAADwPw=="}
+    """Return a file of statistics that wrappers of environments learn."""
+    numbers = {"dtype": "<f8", "shape": [2], "values": "AAAAAAAA8D8AAAAAAADwPw=="}  # 1.0 twice
     statistics = {"wrapper": "NormalizeObservation", "numbers": {"obs_rms.mean": numbers}}
     return [json.dumps([statistics, statistics]).encode()]
 
@@ -315,7 +314,7 @@ def read_numbers(path):
 MUTATED = {
     **READERS, "statistics": Reader("statistics.json", statistics, read_numbers, (ValueError,))
 }  # fmt: skip
-"""Readers, one of them of a part of a file alone."""
+"""Readers of files, and of statistics, which are a part of other files."""
 
 OTHER_CONTENTS = {
     ".safetensors": (with_other_contents, with_other_header),
@@ -329,7 +328,7 @@ def good_files(name):
 
 
 def read_mutation(name, number):
-    """Say what is wrong with how a reader takes a mutation, which its number gives again."""
+    """Read the mutation of a good file with this number; return the fault of its reader, or ""."""
     reader, random = MUTATED[name], np.random.RandomState(number % 2**32)
     path = Path.cwd() / reader.name
     changes = (with_other_bytes, *OTHER_CONTENTS.get(path.suffix, ()))
@@ -339,7 +338,7 @@ def read_mutation(name, number):
 
 
 def mutation_cells(name, first, n_mutations):
-    """Mutations of good files from a number on; before the first of all, the files themselves."""
+    """Yield cells of mutations, numbered from ``first`` on, and if it is 0 of the good files."""
     for number, data in enumerate(good_files(name) if first == 0 else ()):
         yield f"{name}, good file {number}", functools.partial(read_good, name, data)
     for number in range(first, first + n_mutations):

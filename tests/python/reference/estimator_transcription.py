@@ -68,7 +68,10 @@ class Trainer:
 
 
 def p_delta(potentials, target, share=1.0):
-    """+1, 0 or -1 per unit: the units nearest to their threshold on the wrong side."""
+    """Return +1, 0 or -1 for each unit: those nearest to their threshold are corrected.
+
+    They are on the side of it where too many units are.
+    """
     error = min(max(int(target + 0.5), 0), len(potentials)) - np.count_nonzero(potentials > 0)
     n_delta = max(1, int(share * abs(error) + 0.5)) if error else 0
     changes = np.zeros(len(potentials), dtype=np.int32)
@@ -102,7 +105,10 @@ class PDeltaTrainer(Trainer):
 
 
 def class_pairs(n_classes):
-    """The units of one-versus-one: (0, 1), (0, 2), ..., (1, 2), ...; firing votes for the first."""
+    """Return the classes that each unit tells apart: (0, 1), (0, 2), ..., (1, 2), and so on.
+
+    A firing unit votes for the first of its pair.
+    """
     return [(i, j) for i in range(n_classes) for j in range(i + 1, n_classes)]
 
 

@@ -1,7 +1,8 @@
 """Prints the files of the package in which a command calls a function, as a JSON list.
 
-Usage: footprint.py COMMAND... Bodies of modules and classes do not count; nor does what comes after
-the first figure, where one is drawn. A line before the list has the number with bodies of classes.
+Usage: footprint.py COMMAND... Executed bodies of modules and classes are no calls. The command ends
+when it saves its first figure. A line before the list has the number of files that is reached if
+bodies of classes count as calls.
 """
 
 import inspect
@@ -18,6 +19,7 @@ FILES, WITH_CLASSES = set(), set()
 
 
 def watch(frame, event, _argument):
+    """Record the file of a call, if it is of the package; the function of a profiler."""
     code = frame.f_code
     if event == "call" and code.co_name == "savefig":
         finish()
@@ -25,7 +27,7 @@ def watch(frame, event, _argument):
     if event == "call" and is_ours and code.co_name != "<module>":
         name = code.co_filename.removeprefix(PACKAGE)
         WITH_CLASSES.add(name)
-        if code.co_flags & inspect.CO_OPTIMIZED:
+        if code.co_flags & inspect.CO_OPTIMIZED:  # a function, not the body of a class
             FILES.add(name)
 
 

@@ -1,4 +1,4 @@
-"""Makes the network of `docs/examples/sdnn_q_learning.py` from what the core has drawn."""
+"""Makes the network of `docs/examples/sdnn_q_learning.py` with the core's random numbers."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ class RoundedAway(page.SDNNC):
 
 
 def transcribe(core: _core.SDNNC, **learning: Any) -> page.SDNNC:
-    """The page's network with the core's code books, permutations, weights and thresholds.
+    """Return the page's network with the core's code books, permutations, weights and thresholds.
 
-    Its settings are the core's, and those of learning that are given.
+    Its settings are the core's and ``learning``.
     """
     config = core.config
     n, n_active, n_actions = config.n_hidden_units, config.n_active_units, core.n_actions

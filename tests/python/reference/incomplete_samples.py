@@ -1,4 +1,4 @@
-"""Cells about incomplete samples: rows of weight 0 are absent, missing numbers have a pattern."""
+"""Cells (a name, and a function that returns a fault) about missing numbers and weights of 0."""
 
 import itertools
 import pickle
@@ -41,6 +41,7 @@ ABSENT = {
 }
 PLACES = {"first": [0, 0], "inside": [5, 20, 20], "last": [40], "many": [*range(0, 41, 2)]}
 SCALES = {"first": 1.0, "inside": 0.1, "last": 1e-3, "many": 10.0}
+"""Where rows of weight 0 are inserted among the 40 samples, and factors of all weights."""
 
 
 def _table(values):
@@ -53,7 +54,7 @@ def _learned(model, X, y, weights):
     return model.partial_fit(X, y, sample_weight=weights, **classes)
 
 
-HABITS = {
+WAYS_TO_LEARN = {
     "fit": lambda model, *data: model.fit(*data),
     "fit of tables": lambda model, X, *data: model.fit(_table(X), *data),
     "fit twice": lambda model, *data: model.fit(*data).set_params(warm_start=True).fit(*data),
@@ -63,16 +64,18 @@ HABITS = {
 
 
 def weight_cells():
-    """A fit with rows of weight 0 has the bits of the fit without them, and no warning."""
+    """Yield cells: a model with rows of weight 0 has the bits of one without, and no warning."""
     for cls in ESTIMATORS:
-        tasks, habits = TARGETS[cls in CLASSIFIERS], list(HABITS)[: 5 if cls in NETWORKS else 2]
-        for task, rows, place, habit in itertools.product(tasks, ABSENT, PLACES, habits):
-            for setting in SETTINGS[cls in NETWORKS] if habit == "fit" else [{}]:
-                cell = _weight_cell(cls, setting, tasks[task], ABSENT[rows], place, HABITS[habit])
-                yield f"{cls.__name__}({setting}) of {task}: rows {rows} {place}, {habit}", cell
+        tasks = TARGETS[cls in CLASSIFIERS]
+        ways = list(WAYS_TO_LEARN)[: 5 if cls in NETWORKS else 2]  # kernels learn by `fit` only
+        for task, rows, place, way in itertools.product(tasks, ABSENT, PLACES, ways):
+            learn = WAYS_TO_LEARN[way]
+            for setting in SETTINGS[cls in NETWORKS] if way == "fit" else [{}]:
+                cell = _weight_cell(cls, setting, tasks[task], ABSENT[rows], place, learn)
+                yield f"{cls.__name__}({setting}) of {task}: rows {rows} {place}, {way}", cell
 
 
-def _weight_cell(cls, setting, y, change, place, habit):
+def _weight_cell(cls, setting, y, change, place, learn):
     def run():
         indices, weights = PLACES[place], SCALES[place] * WEIGHTS
         rows, targets = change(X[: len(indices)], y[: len(indices)])
@@ -80,8 +83,8 @@ def _weight_cell(cls, setting, y, change, place, habit):
         settings = ESTIMATORS[cls][1] | setting
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            expected = habit(cls(**settings), X, y, weights)
-            model = habit(cls(**settings), *data, np.insert(weights, indices, 0.0))
+            expected = learn(cls(**settings), X, y, weights)
+            model = learn(cls(**settings), *data, np.insert(weights, indices, 0.0))
         return "" if _state(model) == _state(expected) else "another model was learned"
 
     return run
@@ -113,7 +116,7 @@ GAPS = {"first": [0], "whole numbers": [2], "two": [0, 1], "all": [0, 1, 2]}
 
 
 def missing_cells():
-    """Numbers that are missing from the start are learned; later ones are refused by column."""
+    """Yield cells: numbers missing from the start are learned, later ones refused by column."""
     for cls in ESTIMATORS:
         occasions = list(OCCASIONS)[: 4 if cls in NETWORKS else 2]
         for coding, gaps, form, occasion in itertools.product(CODINGS, GAPS, FORMS, occasions):
@@ -124,7 +127,7 @@ def missing_cells():
 def _missing_cell(cls, coding, columns, form, occasion):
     def run():
         holes = X.copy()
-        for column in columns:
+        for column in columns:  # about every fifth number
             holes[column :: 5 + column, column] = np.nan
         y = next(iter(TARGETS[cls in CLASSIFIERS].values()))
         model = cls(**ESTIMATORS[cls][1], coding=coding)
@@ -134,6 +137,7 @@ def _missing_cell(cls, coding, columns, form, occasion):
 
 
 def _in_fit(model, columns, full, holes, y):
+    """Fit with missing numbers; compare with the coding WithMissing for their columns."""
     missing = WithMissing(base=coding_named(model.coding))
     each = [(missing if column in columns else model.coding, [column]) for column in range(3)]
     expected = clone(model).set_params(coding=each).fit(holes, y)

@@ -1,4 +1,4 @@
-"""Cells about logged transitions: each form of a log is learned alike, or refused by its place."""
+"""Cells (a name, and a function that returns a fault) about logged transitions in many forms."""
 
 import csv
 import json
@@ -12,7 +12,7 @@ from sdnn.approximators import LinearSDNNConfig
 
 SPACE, BUTTONS = gym.spaces.Box(-1.0, 1.0, (2,), np.float64), gym.spaces.Discrete(3)
 NAMES = ("observations", "actions", "rewards", "next_observations", "terminations", "truncations")
-HABITS = ("obs", "acts", "rews", "next_obs", "terminals", "timeouts")
+OTHER_NAMES = ("obs", "acts", "rews", "next_obs", "terminals", "timeouts")
 LENGTH, N_EPISODES = 6, 3
 
 
@@ -23,15 +23,15 @@ def new_agent():
 
 
 def arrays():
-    """Return columns of three episodes, the last of which was cut off."""
+    """Return the columns `NAMES` of three episodes, of which the last is truncated."""
     rng = np.random.default_rng(1)
     n = LENGTH * N_EPISODES
     states = rng.uniform(-1, 1, (N_EPISODES, LENGTH + 1, 2))
     ends = np.arange(n) % LENGTH == LENGTH - 1
-    is_last = np.arange(n) >= n - LENGTH
+    is_in_last = np.arange(n) >= n - LENGTH
     before, after = states[:, :-1].reshape(n, 2), states[:, 1:].reshape(n, 2)
-    columns = before, rng.integers(3, size=n), rng.normal(size=n), after, ends & ~is_last
-    return dict(zip(NAMES, (*columns, ends & is_last), strict=True))
+    columns = before, rng.integers(3, size=n), rng.normal(size=n), after, ends & ~is_in_last
+    return dict(zip(NAMES, (*columns, ends & is_in_last), strict=True))
 
 
 def rows(columns):
@@ -43,7 +43,7 @@ def transitions(columns):
 
 
 def episodes(columns):
-    """Return episodes as Minari and imitation have them, of as many rows as there are."""
+    """Return episodes in the form of Minari and imitation: one observation more than actions."""
     all_episodes = []
     for first in range(0, len(columns["rewards"]), LENGTH):
         episode = {name: values[first : first + LENGTH] for name, values in columns.items()}
@@ -85,7 +85,7 @@ def table(columns):
 FORMS = {
     "arrays": dict,
     "lists": lambda columns: {name: list(values) for name, values in columns.items()},
-    "other names": lambda columns: dict(zip(HABITS, columns.values(), strict=True)),
+    "other names": lambda columns: dict(zip(OTHER_NAMES, columns.values(), strict=True)),
     "flags as numbers": lambda columns: {
         name: values.astype(float) if values.dtype == bool else values
         for name, values in columns.items()
@@ -108,8 +108,10 @@ FORMS = {
 
 
 def _set(name, value):
+    """Return a function that sets a number within the second episode to a value."""
+
     def damage(columns):
-        values = columns[name].astype(type(value)) if value != value else columns[name].copy()
+        values = columns[name].copy()
         values[LENGTH + 2] = value
         return columns | {name: values}
 
@@ -136,7 +138,7 @@ DAMAGES = {
 
 
 def log_cells():
-    """Learn every form of a log as its transitions, and refuse each damaged one as a whole."""
+    """Yield cells: every form of a log is learned alike, each damaged one refused as a whole."""
     expected = new_agent()
     for transition, is_cut in zip(transitions(arrays()), arrays()["truncations"], strict=True):
         expected.learn(transition)

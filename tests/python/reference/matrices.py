@@ -1,6 +1,6 @@
-"""All matrices of bad values: tests/robustness tries every cell, the ordinary tests a sample.
+"""All matrices of bad values: tests/robustness runs every cell, the other tests a sample.
 
-A row is a function that makes cells and its arguments; `watched_cells.failures` runs it.
+A row is a function that yields cells, and its arguments; `watched_cells.failures` runs the cells.
 """
 
 import itertools
@@ -53,11 +53,11 @@ ROWS = [row for rows in MATRICES.values() for row in rows]
 
 
 def name_of(row):
-    """The name of a row, as tests are called."""
+    """Return the name of a row for the ids of tests."""
     return "-".join([row[0].__name__, *map(str, row[1:])])
 
 
 def sample_cells(rows, every):
-    """Some cells of rows, spread over parameters and values alike."""
+    """Yield every n-th cell of the rows."""
     cells = (cell for make_cells, *arguments in rows for cell in make_cells(*arguments))
     yield from itertools.islice(cells, 0, None, every)

@@ -1,4 +1,4 @@
-"""Files that a reader may meet: good ones, changed at random places."""
+"""Readers of files, good files for them, and random changes of these files."""
 
 import contextlib
 import dataclasses
@@ -38,7 +38,7 @@ EXTREME = (b"0", b"-1", b"1", b"1e400", b"-1e308", b"NaN", b"2147483648", b"9999
 
 @dataclasses.dataclass(frozen=True)
 class Reader:
-    """Good files, by the name that a file must have, and how to read one of them to its end."""
+    """Name of a kind of files, contents of good ones, how to read one, and the errors of that."""
 
     name: str
     good: Callable[[], list[bytes]]
@@ -46,12 +46,12 @@ class Reader:
     errors: tuple[type[Exception], ...]
 
 
-def written(*makers):
-    """Writers of each kind of file."""
+def written(*writers):
+    """Call functions that write a file to a path; return the contents of the files."""
     contents = []
-    for make in makers:
+    for write in writers:
         with tempfile.TemporaryDirectory() as folder:
-            make(Path(folder) / "file")
+            write(Path(folder) / "file")
             contents.append((Path(folder) / "file").read_bytes())
     return contents
 
@@ -144,7 +144,7 @@ READERS = {
 
 
 def with_other_bytes(data, random):
-    """A few places changed, taken away, doubled, or set to a number that is seldom thought of."""
+    """Flip, replace, remove or repeat bytes at a few positions, or write extreme numbers there."""
     changed = bytearray(data)
     for _ in range(random.randint(1, 4)):
         place = random.randint(len(changed) + 1)
@@ -171,16 +171,15 @@ def with_other_bytes(data, random):
 
 
 def with_other_contents(data, random):
-    """A file whose description or arrays are others, but whose checksum is right."""
+    """Change the description or an array of a file, and give it the right checksum."""
     header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
     metadata = header["__metadata__"]["sdnn"]
     tensors = load(data)
     name = sorted(tensors)[random.randint(len(tensors))]
     kind = random.randint(5)
     if kind == 0:
-        tensors[name] = tensors[name].astype(
-            (np.int8, np.int32, np.int64, np.float64)[random.randint(4)]
-        )
+        dtype = (np.int8, np.int32, np.int64, np.float64)[random.randint(4)]
+        tensors[name] = tensors[name].astype(dtype)
     elif kind == 1:
         tensors[name] = tensors[name].ravel()[: random.randint(tensors[name].size + 1)]
     elif kind == 2 and tensors[name].size:
@@ -196,7 +195,7 @@ def with_other_contents(data, random):
 
 
 def with_other_header(data, random):
-    """Change the header or the numbers of a file, whatever fits, under the right checksum."""
+    """Change bytes of the header or of the arrays of a file, and give it the right checksum."""
     length = int.from_bytes(data[:8], "little")
     start = len(BEFORE) + 8
     beginning, header, body = data[8 : 8 + start], data[8 + start : 8 + length], data[8 + length :]
@@ -216,22 +215,17 @@ SAME_SIZE = ("BOOL U8 I8", "U16 I16 F16", "U32 I32 F32", "U64 I64 F64")
 
 
 def with_other_array(header, random):
-    """Let an array have another type or shape, of as many bytes."""
+    """Give an array in the header another type or shape with the same number of bytes."""
     values = json.loads(header)
     names = sorted(values.keys() - {"__metadata__"})
     array = values[names[random.randint(len(names))]]
     shape = array["shape"]
-    (kinds,) = (
-        names_of_size.split()
-        for names_of_size in SAME_SIZE
-        if array["dtype"] in names_of_size.split()
-    )
+    (dtypes,) = (dtypes.split() for dtypes in SAME_SIZE if array["dtype"] in dtypes.split())
     if random.randint(2):
-        array["dtype"] = kinds[random.randint(len(kinds))]
+        array["dtype"] = dtypes[random.randint(len(dtypes))]
     else:
-        array["shape"] = ([*shape, 1], [1, *shape], [math.prod(shape)], shape[::-1])[
-            random.randint(4)
-        ]
+        shapes = [*shape, 1], [1, *shape], [math.prod(shape)], shape[::-1]
+        array["shape"] = shapes[random.randint(4)]
     return json.dumps(values, separators=(",", ":")).encode()
 
 
@@ -241,7 +235,7 @@ VALUES = (0, 1, -1, 2**31, 2**63 - 1, -(2**63), 0.5, 1e400, None, "", "x", "{}",
 
 
 def with_other_rows(data, random):
-    """A store some of whose values are others, most of them under the right checksums."""
+    """Change values in the tables of a store, in three of four cases with the right checksums."""
     with contextlib.closing(sqlite3.connect(":memory:")) as connection:
         connection.deserialize(data)
         with contextlib.suppress(sqlite3.Error):
@@ -256,15 +250,15 @@ def change_rows(connection, random):
         columns = [row[1] for row in connection.execute(f"PRAGMA table_info({table})")]
         column = columns[random.randint(len(columns))]
         value = VALUES[random.randint(len(VALUES))]
-        if random.randint(3) == 0:  # a little changed
+        if random.randint(3) == 0:  # changed bytes of an old value, instead
             (old,) = connection.execute(f'SELECT "{column}" FROM {table} LIMIT 1').fetchone() or "x"
             value = with_other_bytes(str(old).encode(), random).decode("utf-8", "replace")
         connection.execute(f'UPDATE OR IGNORE {table} SET "{column}" = ?', (value,))
     if random.randint(4):
-        repair(connection)
+        repair_checksums(connection)
 
 
-def repair(connection):
+def repair_checksums(connection):
     for run_id, config in connection.execute("SELECT id, config FROM runs").fetchall():
         rows = connection.execute(
             "SELECT number, part, kind, episode, ifnull(step, -1), length, \"return\", terminated,"

@@ -2,9 +2,9 @@
  * pages, to ones, and programmed from ones to zeros, each byte once. A cut leaves the byte that is
  * programmed with some of its bits, and the page that is erased with some of the old ones.
  *
- * usage: power_cuts STATES STRIDE: stores this many states one after the other, and cuts the power
- * at each STRIDE-th byte of each. Prints the number of cuts, of states lost and of wrong ones, and
- * of those that could not be stored after the cut. */
+ * usage: power_cuts STATES STRIDE: stores STATES states one after the other, and cuts the power at
+ * each STRIDE-th event of storing. Prints the numbers of cuts, of lost and wrong states, of states
+ * that could not be stored after a cut, and of violations of the rules of flash. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -25,7 +25,7 @@ static uint8_t any_byte(void) {
   return (uint8_t)(noise >> 24);
 }
 
-/* Whether the power is cut at this event, which is then done in part. */
+/* Returns whether the power is cut at this event (a byte, or a stage of erasing), partial then. */
 static int is_cut(void) {
   if (is_off || n_left == 0) return is_off = 1;
   --n_left;
@@ -47,7 +47,7 @@ static int program_flash(void *context, uint32_t address, const uint8_t *bytes, 
   for (i = 0; i < n; ++i) {
     if (is_off) return 0;
     n_violations += flash[address + i] != 255;
-    if (is_cut()) { /* some bits, or none */
+    if (is_cut()) { /* some bits are programmed, or none */
       if (any_byte() & 1) flash[address + i] &= (uint8_t)(bytes[i] | any_byte());
       return 0;
     }
@@ -56,7 +56,7 @@ static int program_flash(void *context, uint32_t address, const uint8_t *bytes, 
   return 1;
 }
 
-/* Erases pages from the first or from the last one on. */
+/* Erases pages in ascending or descending order. A cut sets random bits, fewer at early stages. */
 static int erase_flash(void *context, uint32_t address, uint32_t n) {
   const uint32_t n_pages = (n + PAGE - 1) / PAGE;
   const int from_last = any_byte() & 1;
@@ -94,13 +94,14 @@ static void learn(agent_agent *learner, uint32_t n_steps) {
   agent_begin_episode(learner);
 }
 
+/* Stores a state; the power is cut after this number of events. Returns whether it is stored. */
 static int store_until(const agent_agent *stored, uint32_t n_events) {
   n_left = n_events;
   is_off = 0;
   return agent_store(stored, &memory);
 }
 
-/* Starts the processor anew. Returns whether a state was restored, whose image is read then. */
+/* Restarts the processor. Returns whether a state was restored; `image` is that state then. */
 static int restore(void) {
   is_off = 0;
   n_left = UINT32_MAX;
@@ -133,7 +134,7 @@ int main(int argc, char **argv) {
         n_wrong += !is_restored || !is_image(new_image);
         break;
       }
-      if (++n_cuts > n_states * 4 * N_BYTES) return 1; /* it is never stored */
+      if (++n_cuts > n_states * 4 * N_BYTES) return 1; /* storing never ends */
       n_lost += !is_restored;
       n_wrong += is_restored && !is_image(old_image) && !is_image(new_image);
       /* A second cut, and then the state is stored. */

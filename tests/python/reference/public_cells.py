@@ -1,4 +1,4 @@
-"""Cells about public classes: bad values for estimators, codings, environments and functions."""
+"""Cells (a name, and a function that returns a fault) about public classes and functions."""
 
 import contextlib
 import importlib
@@ -61,16 +61,16 @@ LONG_WORK = {
     for parameter in ("max_iter", "n_pattern_units", "n_output_units")
     for word in ("2**20", "2**31", "2**63")
 }
-"""Possible, and takes its time."""
+"""Values that are accepted, but take too long."""
 
-IN_OTHER_WORDS = {("random_state", "list of huge")}
-"""Refused by NumPy, which repeats all of the value before it says why."""
+NOT_NAMED = {("random_state", "list of huge")}
+"""Refused by NumPy in a message of the whole value."""
 
 
 def estimator_cells():
     for cls in ESTIMATORS:
         for parameter in parameters_of(cls.__init__):
-            left_out = {word for name, word in LONG_WORK | IN_OTHER_WORDS if name == parameter}
+            left_out = {word for name, word in LONG_WORK | NOT_NAMED if name == parameter}
             values = {word: value for word, value in BAD.items() if word not in left_out}
             cell = partial(_estimator_cell, cls)
             yield from bad_cells(f"{cls.__name__}({{}})", [parameter], cell, values)
@@ -103,14 +103,14 @@ def _predict_cell(cls):
 
 
 def _without_name(call):
-    """Check that data are refused as scikit-learn does: typed, in its own words."""
+    """Return the fault of a call, which may refuse its data in scikit-learn's words."""
     fault = judged("", call)
     is_typed = fault.startswith(("did not name", "said ValueError: Complex"))
     return "" if is_typed else fault
 
 
 def _named_loosely(parameter, call, value):
-    """Some are named by what is in them, "a feature", or by NumPy, "Seed"."""
+    """Return the fault of a call, which may name a parameter by its content or as NumPy does."""
     fault = judged(parameter, call, value=value)
     if "while getting the repr" in fault or "Exceeds the limit" in fault:
         return ""  # scikit-learn's message has the value
@@ -125,7 +125,7 @@ def _prediction_fault(model):
 
 
 def coding_cells():
-    """A fitted coding has a bin for every value, and patterns of signs; or it is refused."""
+    """Yield cells of codings: a fitted one has a bin for every value, and patterns of +1 and -1."""
     numbers, letters = np.linspace(0.0, 1.0, 12), np.array(["a", "b", "c"] * 4)
     for cls, column, given in (
         (RandomInverse, numbers, {}),
@@ -149,12 +149,12 @@ def _coding_cell(cls, column, given, parameter, value):
             coding = cls(**{**given, parameter: value()}).fit(column, 40)
             return _coding_fault(coding, coding.bins(column))
 
-    shown = None if parameter == "categories" else value  # or the values that they lack
+    shown = None if parameter == "categories" else value  # whose error may show missing ones
     return lambda: judged(parameter, call, value=shown)
 
 
 def _patterns_cell(cls, column, given, parameter, value):
-    """An error of any type: the core's callers have checked both."""
+    """Return a function that accepts an error of any type, as callers have checked both values."""
 
     def run():
         fitted = cls(**given).fit(column, 40)
@@ -179,8 +179,8 @@ def _coding_fault(coding, bins):
     patterns = coding.patterns(40, 1)
     if patterns.shape != (coding.size, 40) or set(np.unique(patterns)) != {-1, 1}:
         return f"has patterns {patterns}"
-    is_place = (bins >= 0) & (bins < coding.size)
-    return "" if is_place.all() else f"has bins {bins} of {coding.size}"
+    is_bin = (bins >= 0) & (bins < coding.size)
+    return "" if is_bin.all() else f"has bins {bins} of {coding.size}"
 
 
 GOOD = {
@@ -240,7 +240,7 @@ GOOD = {
     "trial": lambda: 0,
     "word": lambda: "a",
 }
-"""Arguments of public functions; one that is missing here wants a line."""
+"""Good arguments of public functions; a new parameter needs a line."""
 
 OBJECTS = {
     "case", "cases", "costs", "data", "entry", "executor", "experiment", "measured", "narrow",
@@ -251,10 +251,10 @@ OBJECTS = {
 
 
 ELSEWHERE = {"evaluate", "load_agent"}
-"""Functions that other rows try."""
+"""Functions whose cells are in bad_inputs.py."""
 
 NAMED = {"word": "experiment", "label": "agent", "n_episodes": "episodes", "name": "(name|set)"}
-"""Words of messages for parameters."""
+"""Words by which messages name a parameter."""
 
 
 def tiny_agent():
@@ -264,20 +264,17 @@ def tiny_agent():
 
 
 def public_functions():
-    for module in (
-        *(f"sdnn.{package}" for package in PACKAGES),
-        "sdnn",
-        "sdnn.coding.kernel",
-        "sdnn.export",
-    ):
-        for name in importlib.import_module(module).__all__:
-            value = getattr(importlib.import_module(module), name)
+    packages = [f"sdnn.{package}" for package in PACKAGES]
+    for name_of_module in (*packages, "sdnn", "sdnn.coding.kernel", "sdnn.export"):
+        module = importlib.import_module(name_of_module)
+        for name in module.__all__:
+            value = getattr(module, name)
             if inspect.isfunction(value) and name not in ELSEWHERE:
-                yield f"{module}.{name}", value
+                yield f"{name_of_module}.{name}", value
 
 
 def function_cells():
-    """Every public function: a bad value is refused, or taken; nothing crashes or hangs."""
+    """Yield cells of every public function: a bad value is refused or accepted, without a crash."""
     for name, function in public_functions():
         cell = partial(_function_cell, function)
         yield from bad_cells(f"{name}({{}})", parameters_of(function), cell)
@@ -310,53 +307,58 @@ def _function_cell(function, parameter, value):
         given = {name: GOOD[name]() for name in parameters} | {parameter: value()}
         if "case" in parameters and parameter != "agent":
             given["agent"] = "sdnn-c"
-        if parameter not in OBJECTS:
-            return _without_key(NAMED.get(parameter, parameter), lambda: (function(**given), "")[1])
-        with contextlib.suppress(Exception):
+
+        def call():
             function(**given)
+            return ""
+
+        if parameter not in OBJECTS:
+            return _without_key(NAMED.get(parameter, parameter), call)
+        with contextlib.suppress(Exception):
+            call()
         return ""
 
     return run
 
 
 def experiment_cells():
-    """Settings of trials are refused when they are made, or work."""
-    made = {
-        ProtocolSpec: _protocol_used,
-        BudgetSpec: _budget_used,
-        EnvironmentSpec: _environment_used,
-        RunSpec: _spec_used,
+    """Yield cells of the settings of trials: they are refused when they are made, or work."""
+    uses = {
+        ProtocolSpec: _use_protocol,
+        BudgetSpec: _use_budget,
+        EnvironmentSpec: _use_environment,
+        RunSpec: _use_spec,
     }
-    for config, used in made.items():
-        cell = partial(_experiment_cell, used)
+    for config, use in uses.items():
+        cell = partial(_experiment_cell, use)
         yield from bad_cells(f"{config.__name__}({{}})", parameters_of(config), cell)
 
 
-def _experiment_cell(used, parameter, value):
-    return lambda: _without_key(parameter, lambda: used({parameter: value()}), value)
+def _experiment_cell(use, parameter, value):
+    return lambda: _without_key(parameter, lambda: use({parameter: value()}), value)
 
 
 def _without_key(parameter, call, value=None):
-    """Judge a call whose ConfigError counts as a ValueError."""
+    """Return the fault of a call whose ConfigError counts as a ValueError."""
 
-    def called():
+    def converted():
         try:
             return call()
         except ConfigError as error:
             raise ValueError(str(error)) from error
 
-    return judged(parameter, called, value=value)
+    return judged(parameter, converted, value=value)
 
 
-def _protocol_used(given):
-    return _spec_used({"protocol": ProtocolSpec(**given), "budget": BudgetSpec(episodes=20)})
+def _use_protocol(given):
+    return _use_spec({"protocol": ProtocolSpec(**given), "budget": BudgetSpec(episodes=20)})
 
 
-def _budget_used(given):
-    return _spec_used({"budget": BudgetSpec(**given)})
+def _use_budget(given):
+    return _use_spec({"budget": BudgetSpec(**given)})
 
 
-def _environment_used(given):
+def _use_environment(given):
     environment = EnvironmentSpec(**{"id": "Pendulum-v1", **given})
     with contextlib.suppress(ConfigError):  # of an id that nobody has registered
         observation, _ = environment.make().reset(seed=1)
@@ -364,7 +366,7 @@ def _environment_used(given):
     return ""
 
 
-def _spec_used(given):
+def _use_spec(given):
     RunSpec(**{"environment": "Pendulum-v1", "agent": "fuzzy"} | given).make_trial(1).advance(1)
     return ""
 
@@ -409,7 +411,7 @@ def _config_cell(config, parameter, value):
 
     def run():
         fault = judged(parameter, call, value=value)
-        return "" if "integration_step" in fault else fault  # forces too strong for it
+        return "" if "integration_step" in fault else fault  # forces may be too strong for a step
 
     return run
 

@@ -1,7 +1,6 @@
-"""Lives of agents in random spaces with random settings, for the soak and for single inputs.
+"""Cells (a name, and a function that returns a fault) about lives of agents in random spaces.
 
-A life trains through the warm-up and all choices of inputs, is saved and loaded in between, and
-both agents continue alike.
+In a life, an agent is trained, saved and loaded; the agent and its loaded copy continue alike.
 """
 
 import re
@@ -44,7 +43,7 @@ REWARDS = (0.0, 1.0, -1.0, 1e-3, 1e12, 1e30, -1e300, 1e300, 5e-324, -5e-324)
 
 
 class Walk(gym.Env):
-    """Random walks in any space; the first action moves the first number."""
+    """Random walks in any space; a share ``lost`` of the numbers that it observes is missing."""
 
     def __init__(
         self, space, actions, seed, *, has_angle=False, has_glitches=False, lost=0.0, durations=()
@@ -54,21 +53,22 @@ class Walk(gym.Env):
         self.has_glitches, self.lost, self.x = has_glitches, lost, 0.0
         self.durations, self.metadata = durations, {"durations": bool(durations)}
 
-    def _filled(self, space):
-        if isinstance(space, gym.spaces.Dict | gym.spaces.Tuple):
-            parts = space.spaces.items() if isinstance(space, gym.spaces.Dict) else enumerate(space)
-            filled = {name: self._filled(part) for name, part in parts}
-            return filled if isinstance(space, gym.spaces.Dict) else tuple(filled.values())
-        return self._without_lost(self._values(space))
+    def _observe(self, space):
+        if isinstance(space, gym.spaces.Dict):
+            return {name: self._observe(part) for name, part in space.spaces.items()}
+        if isinstance(space, gym.spaces.Tuple):
+            return tuple(self._observe(part) for part in space)
+        return self._with_lost(self._values(space))
 
-    def _without_lost(self, values):
+    def _with_lost(self, values):
+        """Mark some numbers as missing, by a mask or by values that are not finite."""
         if self.lost == 0.0:
             return values
         is_lost = self.random.random(np.shape(values)) < self.lost
         if self.random.random() < 0.5:
             return np.ma.array(values, mask=is_lost)
-        lost = np.where(is_lost, self.random.choice([np.nan, INF, -INF]), values)
-        return lost if is_lost.any() else values
+        marked = np.where(is_lost, self.random.choice([np.nan, INF, -INF]), values)
+        return marked if is_lost.any() else values
 
     def _values(self, space):
         if not isinstance(space, gym.spaces.Box):
@@ -86,7 +86,7 @@ class Walk(gym.Env):
         if seed is not None:
             self.random = np.random.default_rng(seed)
         self.n, self.x = 0, self.random.uniform(-1, 1)
-        return self._filled(self.observation_space), {}
+        return self._observe(self.observation_space), {}
 
     def step(self, action):
         self.n += 1
@@ -96,7 +96,7 @@ class Walk(gym.Env):
             reward = self.random.choice(REWARDS)
         is_over = self.random.random() < 0.05
         info = {"dt": self.durations[self.n % len(self.durations)]} if self.durations else {}
-        return self._filled(self.observation_space), float(reward), is_over, self.n >= 30, info
+        return self._observe(self.observation_space), float(reward), is_over, self.n >= 30, info
 
 
 def random_space(random):
@@ -128,7 +128,7 @@ def random_actions(random, agent_class):
 
 def random_settings(random, agent_class):
     """Return small networks and settings that matter for the kinds of inputs."""
-    n = int(random.choice([0, 5, 100]))
+    averaging_interval = int(random.choice([0, 5, 100]))
     common = {
         "observation_range": random.choice([None, "adaptive"]),
         "warm_up_steps": int(random.choice([2, 50, 120, 200])),
@@ -141,7 +141,7 @@ def random_settings(random, agent_class):
             tie_tolerance=float(random.choice([0.0, 0.5])),
         )
         config = LinearSDNNConfig(
-            n_pattern_units=int(random.choice([16, 40])), averaging_interval=n,
+            n_pattern_units=int(random.choice([16, 40])), averaging_interval=averaging_interval,
             max_pairs=int(random.choice([0, 0, 6])), n_actions=int(random.choice([3, 5])),
         )  # fmt: skip
     elif agent_class is SDNNActorCritic:
@@ -156,7 +156,7 @@ def random_settings(random, agent_class):
         learning = QLearningConfig(n_steps=int(random.choice([1, 4])))
         config = SDNNCConfig(
             n_pattern_units=16, n_hidden_units=40, n_active_units=10, n_actions=4,
-            averaging_interval=n, max_pairs=int(random.choice([0, 6])),
+            averaging_interval=averaging_interval, max_pairs=int(random.choice([0, 6])),
         )  # fmt: skip
     elif agent_class is RBFQLearning:
         return common | {
@@ -176,17 +176,17 @@ def random_settings(random, agent_class):
 
 
 def live(agent, env, warm_up_steps, n_steps):
-    """Train, save and load in between; return what is wrong, or ""."""
+    """Train an agent in three parts and its loaded copy likewise; return a fault, or ""."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of rewards, ranges and long episodes
         for n in (warm_up_steps // 2 + 1, warm_up_steps, n_steps):
             agent.save("agent.safetensors")
-            same = load_agent("agent.safetensors")
-            for learner in (agent, same):
+            loaded = load_agent("agent.safetensors")
+            for learner in (agent, loaded):
                 learner.train(env, steps=n, seed=n)
-            agent.save("one.safetensors")
-            same.save("other.safetensors")
-            if Path("one.safetensors").read_bytes() != Path("other.safetensors").read_bytes():
+            agent.save("agent.safetensors")
+            loaded.save("loaded.safetensors")
+            if Path("agent.safetensors").read_bytes() != Path("loaded.safetensors").read_bytes():
                 return "files of an agent and of the loaded one differ"
     if agent._controller.is_warming_up:
         return "the warm-up does not end"
@@ -197,7 +197,7 @@ def live(agent, env, warm_up_steps, n_steps):
 
 
 def single_input_cells():
-    """Every agent learns from a single variable, angle or symbol, of known range or not."""
+    """Yield cells: every agent learns from a single variable, angle or symbol."""
     for agent_class in AGENTS:
         for name, space in SINGLE_INPUTS.items():
             yield f"{agent_class.__name__} of {name}", _single_cell(agent_class, name, space)
@@ -237,7 +237,7 @@ ENTRIES = {
 
 
 def missing_reading_cells():
-    """Missing readings are refused by name, or held or coded, at every entry."""
+    """Yield cells: wherever observations enter, missing numbers are refused, held or coded."""
     for agent_class in AGENTS:
         coded = agent_class in (SDNNQLambda, SDNNActorCritic, SDNNQLearning)
         for missing in ("error", "hold", "code") if coded else ("error", "hold"):
@@ -251,13 +251,15 @@ def _missing_cell(agent_class, missing, space, entry):
     def run():
         random = np.random.default_rng(0)
         actions = random_actions(random, agent_class)
-        env, lost = (Walk(space, actions, 1, lost=share) for share in (0.3, 1.0))
+        env, all_lost = (Walk(space, actions, 1, lost=share) for share in (0.3, 1.0))
         settings = random_settings(random, agent_class) | {"warm_up_steps": 2, "missing": missing}
         agent = agent_class(space, actions, seed=1, **settings)
         if entry in ("values", "log"):
             agent.train(Walk(space, actions, 1), 50)
+        missing_observation, _ = all_lost.reset(seed=1)
+        observation, _ = Walk(space, actions, 1).reset()
         try:
-            ENTRIES[entry](agent, lost.reset(seed=1)[0], Walk(space, actions, 1).reset()[0], env)
+            ENTRIES[entry](agent, missing_observation, observation, env)
         except ValueError as error:
             return "" if missing == "error" and "missing='hold'" in str(error) else str(error)
         return "not refused" if missing == "error" else ""
@@ -269,7 +271,7 @@ HISTORIES = ["none", "none", "auto", "auto", "differences", "averages", "observe
 
 
 def soak_cells(first, n):
-    """Random lives with the numbers ``first`` to ``first + n - 1``."""
+    """Yield cells of the random lives with the numbers ``first`` to ``first + n - 1``."""
     for number in range(first, first + n):
         yield f"life {number}", _soak_cell(number)
 
@@ -294,7 +296,7 @@ def _soak_cell(number):
             env.lost = 0.0 if settings["missing"] == "error" else float(random.choice([0.1, 0.6]))
         env = envs[0]
         if n_environments > 1:
-            env = gym.vector.SyncVectorEnv([lambda made=made: made for made in envs])
+            env = gym.vector.SyncVectorEnv([lambda single=single: single for single in envs])
         n_steps = int(random.choice([300, 900, 3000], p=[0.5, 0.45, 0.05]))
         if settings["missing"] != "code":
             is_grid = agent_class in (RBFQLearning, FuzzyQLearning)  # with few inputs

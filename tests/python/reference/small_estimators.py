@@ -8,13 +8,14 @@ from sdnn.export import small_settings
 
 
 def _regressor(draw, target):
+    """Return a regressor of a function of drawn samples, and the function that draws them."""
     X = draw(1000, 0)
     model = SDNNRegressor(**small_settings(X.shape[1]), random_state=0)
     return model.fit(X, target(X)), draw
 
 
 def _classifier(data):
-    """A classifier of some columns, and rows of them with a little noise."""
+    """Return a classifier of the first four columns, and a function that draws noisy rows."""
     X, y = data.data[:, :4], data.target
 
     def draw(n_samples, seed):
@@ -27,7 +28,7 @@ def _classifier(data):
 
 
 def friedman():
-    """The first four inputs of Friedman's first problem."""
+    """Return a regressor of Friedman's first problem without its fifth term, and a sampler."""
 
     def draw(n_samples, seed):
         return np.random.default_rng(seed).uniform(-0.1, 1.1, (n_samples, 4))
@@ -38,7 +39,7 @@ def friedman():
 
 
 def gas():
-    """The concentration of a gas by a voltage, the temperature and the humidity."""
+    """Return a regressor of a gas's concentration by voltage, temperature and humidity."""
 
     def draw(n_samples, seed):
         return np.random.default_rng(seed).uniform([0.3, -10, 0], [4, 50, 100], (n_samples, 3))
@@ -51,7 +52,7 @@ def gas():
 
 
 def pendulum():
-    """The acceleration of a pendulum with friction and a motor."""
+    """Return a regressor of the acceleration of a pendulum with friction and a motor."""
     high = np.array([np.pi, 8, 2, 0.5])
 
     def draw(n_samples, seed):

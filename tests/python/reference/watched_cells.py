@@ -1,4 +1,4 @@
-"""Runs the cells of a matrix in a process of its own: a crash or a hang is a failed cell."""
+"""Runs the cells of a matrix in a separate process: a crash or a hang is a failed cell."""
 
 import multiprocessing
 import os
@@ -20,11 +20,11 @@ HEADROOM = 2**32
 
 
 def failures(make_cells, *arguments):
-    """Run the cells of ``make_cells(*arguments)``; give their number and what failed.
+    """Run the cells of ``make_cells(*arguments)``; return their number and a list of failures.
 
-    A cell is a pair of a name and a function without arguments, which gives what is wrong, or "".
-    Each is in an empty folder of its own. It has `CELL_SECONDS` and `HEADROOM` bytes; a process
-    that ends, or is ended after `HANG_SECONDS` without a word, is followed by another one.
+    A cell is a pair of a name and a function without arguments that returns a fault, or "". It runs
+    in an empty folder, with `CELL_SECONDS` and `HEADROOM` bytes. If it ends its process, or reports
+    nothing for `HANG_SECONDS`, another process runs the cells that follow.
     """
     context = multiprocessing.get_context("forkserver")
     # The server imports what cells use, once. It begins with this environment and search path;
@@ -70,6 +70,7 @@ def _received(pipe, seconds):
 
 
 def _work(pipe, environment, first, make_cells, arguments):
+    """Run cells from number ``first`` on; send the number of all, then each name and fault."""
     os.environ.clear()
     os.environ.update(environment)
     home = os.getcwd()
@@ -95,7 +96,7 @@ def _work(pipe, environment, first, make_cells, arguments):
 
 
 def faulty_cells():
-    """Cells that fail in every way."""
+    """Yield a cell that works and others that fail in different ways; the last must still run."""
     yield "right", lambda: ""
     yield "wrong", lambda: "was wrong"
     yield "raising", lambda: 1 / 0

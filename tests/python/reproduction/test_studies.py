@@ -162,12 +162,6 @@ def test_differences_of_returns_are_formatted_with_their_signs():
     assert format_estimate(mixed, "mean_return", sign="+") == "-0.01 [-0.02, +0.01]"
 
 
-def test_a_figure_can_be_drawn_with_dollar_signs_in_titles(study):
-    mine = study(TWO.replace('title = "the new one"', 'title = "a$_$"'))
-    png, _ = figure_bytes(draw_study(compare(mine, records_of_old_and_new(mine)), "at $1 or $_$"))
-    assert png.startswith(b"\x89PNG")
-
-
 def test_differences_of_fewer_than_six_trials_are_not_called_different(study):
     for n_trials, differs in ((5, False), (6, True)):
         mine = study(TWO, n_trials=n_trials)

@@ -138,26 +138,24 @@ def test_runs_of_other_tasks_or_settings_are_separate_curves(tmp_path):
     assert len(draw_curves(curves).axes) == 2, "one for each of the two tasks"
 
 
-def configs_that_differ():
-    yield CONFIG
-    for change in (
-        {"steps": 300},
-        {"steps": None, "episodes": 300},
-        {"n_envs": 4},
-        {"evaluate_every": 500},
-        {"evaluate_every": 0},
-        {"evaluation_episodes": 3},
-        {"target_return": 400.0},
-        {"angle_pairs": "find"},
-        {"settings": {"learning": {"discount": 0.5}}},
-        {"environment": EnvironmentSpec(id="CartPole-v1", kwargs={"sutton_barto_reward": True})},
-        {"environment": EnvironmentSpec(id="CartPole-v1", kwargs={"sutton_barto_reward": 1})},
-    ):
-        yield run_spec(CONFIG, **change)
+CHANGES = (
+    {},
+    {"steps": 300},
+    {"steps": None, "episodes": 300},
+    {"n_envs": 4},
+    {"evaluate_every": 500},
+    {"evaluate_every": 0},
+    {"evaluation_episodes": 3},
+    {"target_return": 400.0},
+    {"angle_pairs": "find"},
+    {"settings": {"learning": {"discount": 0.5}}},
+    {"environment": EnvironmentSpec(id="CartPole-v1", kwargs={"sutton_barto_reward": True})},
+    {"environment": EnvironmentSpec(id="CartPole-v1", kwargs={"sutton_barto_reward": 1})},
+)
 
 
 def test_only_runs_that_differ_in_seed_and_output_are_grouped(tmp_path):
-    configs = list(configs_that_differ())
+    configs = [run_spec(CONFIG, **change) for change in CHANGES]
     number_of_config = {}
     for n, config in enumerate(configs):
         for seed in (1, 2):

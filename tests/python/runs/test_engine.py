@@ -193,8 +193,6 @@ def test_ctrl_c_keeps_finished_trials_and_the_next_run_resumes(tmp_path, run):
 
 
 def test_an_error_of_the_store_stops_the_run(tmp_path, use_trial):
-    from sdnn.runs import run_trials
-
     class Full(ResultStore):
         def add(self, record, *, is_exact=True):
             raise StoreError("disk full")

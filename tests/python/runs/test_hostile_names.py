@@ -108,7 +108,7 @@ def test_html_shows_hostile_names_as_plain_text(name):
     assert sum(single_spaced(name) in text for text in tags.texts) >= 11, "fields with the name"
 
 
-@pytest.mark.parametrize("name", [WORST, "$\\frac{", "&<>\"'", "=1+1", "-x|\\"])
+@pytest.mark.parametrize("name", [WORST, "$\\frac{", "a$_$", "&<>\"'", "=1+1", "-x|\\"])
 def test_the_outputs_of_a_study_with_hostile_names_are_harmless(study, name):
     hostile = study(
         f"[study]\ntitle = {json.dumps(name)}\ntrials = 2\n"
