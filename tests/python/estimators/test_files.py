@@ -139,7 +139,7 @@ def nested(depth):
         lambda description, arrays: description["codings"][0].update(n_bins=3),
         lambda description, arrays: description["codings"].insert(0, nested(800)),
     ],
-    ids=["two outputs", "counts", "shape", "two features", "few bins", "800 nested codings"],
+    ids=["two outputs", "other range", "no bool", "two features", "few bins", "nested codings"],
 )
 def test_inconsistent_parts_of_a_file_are_refused_as_damage(change, tmp_path):
     path = tmp_path / "model.safetensors"

@@ -30,7 +30,7 @@ def test_the_two_features_of_a_product_are_selected_among_twelve():
     X, fresh = uniform(300, 12), uniform(500, 12, seed=1)
     model = SDNNKernelRidge().fit(X, product_of_two(X))
     assert model.selected_features_.tolist() == [3, 7]
-    assert model.directions_.shape == (0, 12)
+    assert model.directions_.shape == (0, 12), "no mixtures of features"
     assert model.score(fresh, product_of_two(fresh)) > 0.95
     with_all = SDNNKernelRidge(inputs="all").fit(X, product_of_two(X))
     assert with_all.selected_features_.tolist() == list(range(12))

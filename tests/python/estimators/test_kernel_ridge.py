@@ -186,7 +186,8 @@ def test_predictions_are_sums_of_the_analytic_kernel(pairs):
         model.fit(frame[:90], Y[:90])
         table = frame.to_numpy(dtype=object)
         kernel = model.kernel_(table, model.X_fit_)
-        expected = (kernel + kernel**2) / 2 @ model.dual_coef_ + model.intercept_
+        of_degree_2 = (kernel + kernel**2) / 2
+        expected = of_degree_2 @ model.dual_coef_ + model.intercept_
         np.testing.assert_allclose(model.predict(frame), expected[:, 0], rtol=1e-10)
 
 

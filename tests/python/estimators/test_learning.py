@@ -238,7 +238,7 @@ def test_decisions_are_shares_of_active_units_and_probabilities_their_softmax():
     options = {**SETTINGS, "n_units_per_class": 12, "n_averaged_epochs": 1}
     model = SDNNClassifier(**options, calibrate=False).fit(X, LABELS)
     firing = model.network_.potentials(model.network_.input_code.bins(X), 1) > 0
-    shares = firing.reshape(len(X), 3, 12).mean(axis=2)
+    shares = firing.reshape(len(X), 3, 12).mean(axis=2)  # of 12 units for each of 3 classes
     np.testing.assert_array_equal(model.decision_function(X), shares)
     raised = np.exp(STEEPNESS * shares)
     np.testing.assert_allclose(
@@ -276,10 +276,10 @@ def test_class_weights_are_numbers_of_presentations():
 
 
 def test_balanced_class_weights_predict_the_rare_class_more_often():
-    noisy = np.where(RANDOM.uniform(size=len(Y)) < 0.2, 1, 0)
+    random_labels = np.where(RANDOM.uniform(size=len(Y)) < 0.2, 1, 0)  # class 1 is rare
     options = {**SETTINGS, "max_iter": 8}
-    plain = SDNNClassifier(**options).fit(X, noisy)
-    balanced = SDNNClassifier(**options, class_weight="balanced").fit(X, noisy)
+    plain = SDNNClassifier(**options).fit(X, random_labels)
+    balanced = SDNNClassifier(**options, class_weight="balanced").fit(X, random_labels)
     assert balanced.predict(X).mean() > plain.predict(X).mean()
 
 

@@ -78,12 +78,15 @@ def test_samples_of_usual_distributions_cause_no_warning_until_one_is_distant(se
     y = CLEAN[seed % len(CLEAN)](random)
     options = {"n_pattern_units": 16, "max_iter": 1, "random_state": 0}
     for model in (SDNNRegressor(**options), SDNNKernelRidge(degree=1)):
-        assert not fit_and_watch(model, X, y)[1]
+        _, warned = fit_and_watch(model, X, y)
+        assert not warned
     labels = X[:, 0] > np.quantile(X[:, 0], 0.4)
     labels[:2] = True, False
     for model in (SDNNClassifier(**options), SDNNKernelClassifier(degree=1)):
-        assert not fit_and_watch(model, X, labels)[1]
-        assert fit_and_watch(model, np.vstack([X[1:], X[:1] + 1e4]), labels)[1]
+        _, warned = fit_and_watch(model, X, labels)
+        assert not warned
+        _, warned = fit_and_watch(model, np.vstack([X[1:], X[:1] + 1e4]), labels)
+        assert warned
 
 
 def test_robust_ranges_of_clean_samples_equal_full_ranges():
@@ -120,7 +123,8 @@ def test_usual_range_excludes_few_distant_values():
 def test_only_codings_that_fit_evenly_spaced_bins_warn_of_outliers(coding, warns):
     X = np.arange(100.0)[:, None] / 100
     X[7] = 1e6
-    assert fit_and_watch(network(coding=coding), X, np.arange(100.0))[1] == warns
+    _, warned = fit_and_watch(network(coding=coding), X, np.arange(100.0))
+    assert warned == warns
 
 
 def test_partial_fit_warns_of_outliers_in_its_first_samples():

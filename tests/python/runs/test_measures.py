@@ -63,7 +63,7 @@ def test_final_measures_use_the_last_50_evaluations():
         pytest.param([50] * 100 + [7] * 50, math.inf, id="none after late mastery"),
         pytest.param([7] * 50, math.inf, id="none within the trial"),
         pytest.param([7] * 60 + [50] * 100 + [7] * 60, math.inf, id="a relapse is no collapse"),
-        # The same 160 tests or 1,600 episodes later.
+        # The first case again after 160 tests, which are 1,600 episodes.
         pytest.param([7] * 60 + [50] * 100 + [7] * 60 + [50] * 100, 2440.0, id="after a relapse"),
         pytest.param([50] * 200, 0.0, id="never mastered"),
         pytest.param([7, 50] * 100, 0.0, id="never mastered for a run"),

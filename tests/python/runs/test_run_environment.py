@@ -37,20 +37,20 @@ def test_the_description_of_the_scaling_reproduces_observations(redundant):
     low, high = environment.scaling().ends
     lines = list(environment.scaling().lines())
     for seed in range(5):
-        known = {}  # the scaled observation, computed from the lines only
+        computed = {}  # the scaled observation, from the described ranges and means only
         values, _ = bare.reset(seed=seed)
         for line in lines:
             name, variable, first, last, left, right = re.fullmatch(
                 r"(\S+): (?:variable (\d), from (\S+) to (\S+)|the mean of (\S+) and (\S+))", line
             ).groups()
             if variable is None:
-                known[name] = (known[left] + known[right]) / 2
+                computed[name] = (computed[left] + computed[right]) / 2
             else:
                 unit = (values[int(variable)] - float(first)) / (float(last) - float(first))
-                known[name] = min(max(unit, 0.0), 1.0)
+                computed[name] = min(max(unit, 0.0), 1.0)
         observation, _ = scaled.reset(seed=seed)
-        assert list(known) == [f"observation[{i}]" for i in range(2 + redundant)]
-        np.testing.assert_allclose(observation, list(known.values()), rtol=1e-15)
+        assert list(computed) == [f"observation[{i}]" for i in range(2 + redundant)]
+        np.testing.assert_allclose(observation, list(computed.values()), rtol=1e-15)
         without_redundant, _ = UnitSensors(bare, low, high).reset(seed=seed)
         assert np.array_equal(observation[:2], without_redundant)
 
