@@ -84,7 +84,7 @@ def check_best(make, target, folder, *options):
     header = c_header(agent, "agent", learning=True)
     run_agent(agent, lines_of(agent, 400, 1, header.fraction_bits), header.fraction_bits)
     kept = save_image(agent)
-    later = make()  # goes on learning, so that its policy differs from the kept one
+    later = make()  # learns more, so that its policy differs from the kept one
     load_image(later, kept)
     run_agent(later, lines_of(later, 900, 2, header.fraction_bits), header.fraction_bits)
     n = agent.n_dimensions

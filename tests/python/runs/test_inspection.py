@@ -177,7 +177,7 @@ def test_warnings_name_constant_inputs_and_maps_leave_out_masked_actions(trained
     assert "observation 1 is constant: the agent can do without it." in warnings
     assert not any("uses only" in text for text in warnings)
     assert not any("mask" in text for text in warnings)
-    # Of the actions 0, 1 and 2, the last is always masked.
+    # The last of the actions 0, 1 and 2 is always masked.
     assert set(np.unique(inspection.state_map.actions)) <= {0.0, 1.0}
     assert set(np.unique(inspection.episode.actions)) <= {0.0, 1.0}
     assert "a mask allowed in the nearest state" in inspection.page().to_html("")

@@ -156,7 +156,7 @@ def test_rows_of_a_run_are_appended_until_it_is_finished(tmp_path):
         (record,) = store.load()
         assert record.seconds == 1.5 + 1.5 + 2.0, "of all parts"
         assert record.rows.to_training() == TRAINED
-        # Of the only evaluation: its episode, and the means over its two episodes.
+        # The only evaluation: its episode, and the means over its two episodes.
         assert record.rows.episode.tolist() == [1]
         assert record.rows.steps.tolist() == [5.5]
         assert record.rows.episode_return.tolist() == [1.5]
