@@ -286,8 +286,8 @@ def require_same_kind(agent: object, env: object, argument: str = "env") -> None
         raise ValueError(
             f"{argument} must give observations scaled to [0, 1], as the agent's run did"
             f" ({scaling.words() or 'from which ranges is not known'}): UnitSensors(env,"
-            " *agent.scaling.ends) of sdnn.environments, or Run.open(folder).config.environment"
-            " of sdnn.runs"
+            " *agent.scaling.ends) of sdnn.environments, or, with sdnn.runs,"
+            " Run.open(folder).spec.environment.make()"
         )
     for name, fits in (("observation_space", _can_observe), ("action_space", _has_equal_actions)):
         space, other_space = getattr(agent, name, None), _space_of(env, name)
