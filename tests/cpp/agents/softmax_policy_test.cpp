@@ -6,11 +6,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 #include "sdnn/agents/detail/softmax.hpp"
 #include "sdnn/approximators/detail/thermometers.hpp"
+#include "sdnn/approximators/linear_sdnn.hpp"
 #include "sdnn/core/random.hpp"
+#include "sdnn/core/state.hpp"
 
 namespace sdnn::agents::detail {
 namespace {
@@ -108,6 +111,39 @@ TEST(SoftmaxPolicy, TheMeanOfAnActionAndItsNeighboursIsWeightedByProbabilities) 
   EXPECT_EQ(policy.mean_offset(workspace, 0, 1), 0.25);  // (3 - 1) / (1 + 4 + 3)
   // 1 / (2 + 1) in units of 1 / 65536, rounded down; the first action has one neighbour only.
   EXPECT_EQ(policy.mean_offset(workspace, 1, 0), 65535.0 / 3 / 65536.0);
+}
+
+// Preferences that `learn` keeps equal those of a copy that has to compute them.
+TEST(SoftmaxPolicy, PreferencesAreThoseOfTheWeightsAfterEveryStep) {
+  const std::size_t only[] = {1};
+  const approximators::LinearSDNN net({.n_inputs = 2, .n_pattern_units = 64}, only, 1);
+  auto present = net.workspace();
+  auto next = net.workspace();
+  SoftmaxPolicy policy({3, 4}, net.n_slots());
+  auto trace = policy.trace();
+  auto workspace = policy.workspace();
+  auto of_copy = policy.workspace();
+  core::Random random(1, core::Stream::exploration);
+  net.read(std::vector{0.5, 0.5}, present);
+  for (int t = 0; t < 40; ++t) {
+    net.read(std::vector{random.uniform(), random.uniform()}, next);
+    policy.read_and_keep(present.code(), workspace);
+    policy.allow({}, workspace);
+    const std::size_t action[] = {random.below(3), random.below(4)};
+    const bool is_last = t % 10 == 9;
+    policy.learn(present.code(), workspace, action, trace,
+                 {.error = SoftmaxPolicy::kErrorOne, .rate = 6554, .entropy = 655, .decay = 7299},
+                 is_last ? nullptr : &next.code());
+    SoftmaxPolicy copy({3, 4}, net.n_slots());
+    core::restore(copy, core::state_of(policy));
+    for (const auto* read : {&next, &present}) {
+      policy.read(read->code(), workspace);
+      copy.read(read->code(), of_copy);
+      EXPECT_EQ(workspace.preferences, of_copy.preferences) << t;
+    }
+    std::swap(present, next);
+  }
+  EXPECT_NE(workspace.preferences, std::vector<std::int64_t>(7));
 }
 
 }  // namespace

@@ -167,7 +167,8 @@ class ActorCritic : public IndexAgent<ActorCritic> {
       next = td_.in_range(episodes_, [&] { return critic().sum(episode.next, kOnlyAction); });
     }
     const bool is_allowed = allows_action(episode.mask, action);
-    learn_step(episode, action, reward, next, is_allowed ? ActionMask(episode.mask) : ActionMask());
+    learn_step(episode, action, reward, next, terminated ? nullptr : &episode.next.code(),
+               is_allowed ? ActionMask(episode.mask) : ActionMask());
     if (terminated) {
       end(episode);
       episode.mask.clear();
@@ -304,7 +305,7 @@ class ActorCritic : public IndexAgent<ActorCritic> {
   /// Draws an action by the policy.
   Action explore(std::span<const double> state, Episode& episode, ActionMask mask) {
     critic().read_next(state, episode.next);
-    actor_.read(episode.next.code(), workspace_.actor);
+    actor_.read_and_keep(episode.next.code(), workspace_.actor);
     actor_.allow(mask, workspace_.actor);
     actor_.draw(workspace_.actor, exploration_, workspace_.action);
     episode.mask.assign(mask.begin(), mask.end());
@@ -327,9 +328,10 @@ class ActorCritic : public IndexAgent<ActorCritic> {
     episode.next_state.clear();
   }
 
-  /// Learns one step; `next` is V(s') in the critic's unit.
+  /// Learns one step; `next` is V(s') in the critic's unit, `next_code` that of s', unless it is
+  /// terminal.
   void learn_step(Episode& episode, Action action, double reward, std::int64_t next,
-                  ActionMask mask) {
+                  const approximators::LinearCode* next_code, ActionMask mask) {
     const bool is_dutch = n_environments() == 1;
     const auto error = td_.error_of(episode, episodes_, kOnlyAction, reward, next, is_dutch);
     actor_.read(episode.present.code(), workspace_.actor);
@@ -338,7 +340,8 @@ class ActorCritic : public IndexAgent<ActorCritic> {
                  {.error = scale_.normalized(error.error, critic().exponent().value_or(0)),
                   .rate = actor_rate_,
                   .entropy = static_cast<std::int32_t>(std::lround(config_.entropy * kOne)),
-                  .decay = td_.decay(episode)});
+                  .decay = td_.decay(episode)},
+                 next_code);
     td_.correct(episode, episodes_, kOnlyAction, error, rate_, is_dutch);
   }
 

@@ -52,6 +52,7 @@ class SoftmaxPolicy {
         n_unit_bits_(std::min(40, 16 + static_cast<int>(std::bit_width(n_columns / 4)))) {
     for (const std::size_t n : n_actions_) n_rows_ += n;
     weights_.resize(n_rows_ * n_columns_);
+    read_preferences_.resize(n_rows_);
   }
 
   std::size_t n_dimensions() const noexcept { return n_actions_.size(); }
@@ -68,16 +69,18 @@ class SoftmaxPolicy {
 
   /// Computes the preferences in the state of a code: the slow part of an act.
   void read(const Code& code, Workspace& workspace) const {
-    constexpr std::size_t kAtOnce = 64;
-    const std::int32_t* rows[kAtOnce];
-    for (std::size_t row = 0; row < n_rows_;) {
-      const std::size_t first = row;
-      for (; row < n_rows_ && row - first < kAtOnce; ++row) {
-        rows[row - first] = &weights_[row * n_columns_];
-      }
-      approximators::row_sums(rows, row - first, code.signs().data(), n_columns_,
-                              &workspace.preferences[first]);
+    if (code.signs() == read_signs_) {
+      std::ranges::copy(read_preferences_, workspace.preferences.begin());
+      return;
     }
+    sum_rows(code, 0, n_rows_, workspace.preferences);
+  }
+  /// Computes the preferences, and keeps them for later calls of `read`, as long as weights stay.
+  void read_and_keep(const Code& code, Workspace& workspace) {
+    read(code, workspace);
+    if (code.signs() == read_signs_) return;
+    read_signs_ = code.signs();
+    read_preferences_ = workspace.preferences;
   }
   /// Computes the probabilities of the allowed actions in the state that was read last.
   void allow(ActionMask mask, Workspace& workspace) const {
@@ -122,9 +125,11 @@ class SoftmaxPolicy {
   /// Decays the trace, adds the gradient of log pi(action | s) to it, and moves the weights along
   /// the trace by rate / n times the error, and along the gradient of the entropy, where n is the
   /// number of columns of the code that are not 0. Requires that `read` has read the code, and
-  /// `allow` was called.
+  /// `allow` was called. If there is a next code, its preferences are computed row by row while the
+  /// changed weights are in the cache, and kept for `read`.
   void learn(const Code& code, const Workspace& workspace, std::span<const std::size_t> action,
-             Trace& trace, const Step& step) {
+             Trace& trace, const Step& step, const Code* next = nullptr) {
+    read_signs_.clear();
     const std::int64_t n = std::max<std::int64_t>(1, code.n_active());
     const std::int64_t rate = (std::int64_t{step.rate} << 12) / n;  // in units of 2^-28
     const std::int64_t along_trace =
@@ -153,8 +158,14 @@ class SoftmaxPolicy {
             weights, trace.row(row), code.signs().data(), n_columns_, row_step);
         trace.set_live(row, use.traces != 0);
         if (use.weights >= approximators::kLargestWeight - 1) clip(weights);
+        const std::size_t n_learned = row + 1;
+        if (next != nullptr && (n_learned % kRowsInCache == 0 || n_learned == n_rows_)) {
+          const std::size_t first = row - row % kRowsInCache;
+          sum_rows(*next, first, n_learned, read_preferences_);
+        }
       }
     }
+    if (next != nullptr) read_signs_ = next->signs();
   }
 
   /// Lists the members that are saved and restored; see core/state.hpp.
@@ -166,10 +177,28 @@ class SoftmaxPolicy {
         return w > -approximators::kLargestWeight && w < approximators::kLargestWeight;
       };
       archive.expect(std::ranges::all_of(self.weights_, fits), "weights", "below 2^23 in size");
+      self.read_signs_.clear();
     }
   }
 
  private:
+  static constexpr std::size_t kRowsInCache = 4;  ///< rows whose signs `row_sums` reads once
+
+  /// Computes the preferences of some rows.
+  void sum_rows(const Code& code, std::size_t row, std::size_t end,
+                std::vector<std::int64_t>& preferences) const {
+    constexpr std::size_t kAtOnce = 64;
+    const std::int32_t* rows[kAtOnce];
+    while (row < end) {
+      const std::size_t first = row;
+      for (; row < end && row - first < kAtOnce; ++row) {
+        rows[row - first] = &weights_[row * n_columns_];
+      }
+      approximators::row_sums(rows, row - first, code.signs().data(), n_columns_,
+                              &preferences[first]);
+    }
+  }
+
   void clip(std::int32_t* weights) const noexcept {
     constexpr std::int32_t kMost = approximators::kLargestWeight - 1;
     for (std::size_t j = 0; j < n_columns_; ++j) weights[j] = std::clamp(weights[j], -kMost, kMost);
@@ -180,6 +209,8 @@ class SoftmaxPolicy {
   std::size_t n_columns_;
   int n_unit_bits_;
   std::vector<std::int32_t> weights_;
+  std::vector<std::int8_t> read_signs_;  ///< the code whose preferences are kept; empty: none
+  std::vector<std::int64_t> read_preferences_;
 };
 
 }  // namespace sdnn::agents
