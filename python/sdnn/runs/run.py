@@ -25,7 +25,6 @@ from sdnn.agents import (
     Training,
     UnrepeatedEpisodeError,
     UnusableStepError,
-    evaluate,
     load_agent,
 )
 from sdnn.agents.agent import AnyAgent
@@ -50,6 +49,7 @@ from sdnn.support.display import Displayed
 from sdnn.support.files import lock, open_to_append, remove_abandoned_files, write_whole
 from sdnn.support.interrupts import Interrupts
 from sdnn.support.machine import instruction_set
+from sdnn.training.evaluation import greedy_episodes
 from sdnn.training.loop import Row
 from sdnn.training.training import checked_callbacks
 
@@ -260,9 +260,10 @@ class Run(Displayed):
             self.check_spaces(agent, env)
             try:
                 options = self.reset_options(env)
-                evaluation = evaluate(agent, env, episodes, seed=root, options=options)
+                evaluation = greedy_episodes(agent, env, episodes, seed=root, options=options)
             except UnusableStepError as error:
                 raise RunError(f"{self.spec.task}: {error}") from error
+        assert evaluation is not None  # nothing stops it
         return RunEvaluation(**vars(evaluation), is_warming_up=agent.is_warming_up)
 
     def check_spaces(self, agent: AnyAgent, env: Env) -> None:

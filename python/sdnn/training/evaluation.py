@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import closing
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -87,11 +87,10 @@ def evaluate(
 ) -> Evaluation:
     """Run greedy episodes, in which nothing is learned and nothing of the agent's future changes.
 
-    An episode that seems not to end is warned of. Random draws for greedy actions, where several
-    are best or all are random in a warm-up, come from a stream that runs on from call to call and
-    that learning does not use. Wrappers that learn, such as Gymnasium's ``NormalizeObservation``,
-    keep their statistics; those that have seen nothing get what the agent's training had learned,
-    else they are warned of.
+    An episode that seems not to end is warned of. Random draws for greedy actions come from a stream that runs on from call to call
+    and that learning does not use. Wrappers that learn, such as ``NormalizeObservation``, keep
+    their statistics; those that have seen nothing get what the agent's training had learned, else
+    they are warned of.
 
     Parameters
     ----------
@@ -118,9 +117,28 @@ def evaluate(
         `ValueError` that names step and episode.
     """
     has_methods("agent", agent, "an agent", "act")
+    evaluation = greedy_episodes(agent, env, episodes, seed=seed, options=options)
+    assert evaluation is not None  # nothing stops it
+    return evaluation
+
+
+def greedy_episodes(
+    agent: ActingAgent,
+    env: Env | str,
+    episodes: int,
+    *,
+    seed: int | None,
+    options: Data | None,
+    should_stop: Callable[[], bool] | None = None,
+) -> Evaluation | None:
+    """Evaluate like `evaluate`.
+
+    None where ``should_stop``, which is called in each step, returns True. The agent's state is
+    that from before then, and after an error, so that the same evaluation can be made later.
+    """
     if isinstance(env, str):
         with closing(made("env", env)) as env_of_id:
-            return evaluate(agent, env_of_id, episodes, seed=seed, options=options)
+            return greedy_episodes(agent, env_of_id, episodes, seed=seed, options=options)
     require_single("env", env)
     require_same_kind(agent, env)
     root = None if seed is None else seed_of(seed)
@@ -128,13 +146,19 @@ def evaluate(
     is_options = isinstance(options, dict | None)
     require(is_options, "options", "be a dictionary or None", options, TypeError)
     returns, lengths, terminated = [], [], []
-    for episode in range(n_episodes):
-        for now in greedy_episode(agent, env, root, episode, options):
-            if now.n_steps == _LONG:
-                warn_of_endless_episode(_LONG)
-        returns.append(now.total_reward)
-        lengths.append(now.n_steps)
-        terminated.append(now.terminated)
+    with ExitStack() as restoring:
+        if should_stop is not None and (core := getattr(agent, "_controller", None)):
+            restoring.callback(core.restore, core.state())  # greedy actions draw random numbers
+        for episode in range(n_episodes):
+            for now in greedy_episode(agent, env, root, episode, options):
+                if should_stop is not None and should_stop():
+                    return None
+                if now.n_steps == _LONG:
+                    warn_of_endless_episode(_LONG)
+            returns.append(now.total_reward)
+            lengths.append(now.n_steps)
+            terminated.append(now.terminated)
+        restoring.pop_all()
     return Evaluation(
         returns=np.array(returns), lengths=np.array(lengths), terminated=np.array(terminated, bool)
     )

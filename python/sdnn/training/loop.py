@@ -21,7 +21,7 @@ from sdnn.environments.types import Array, Data, Element, Elements, Info, Mask, 
 from sdnn.support.arguments import require
 from sdnn.support.interrupts import Interrupts
 from sdnn.training.episodes import Episodes, checked_outcome
-from sdnn.training.evaluation import evaluate
+from sdnn.training.evaluation import greedy_episodes
 from sdnn.training.files import EpisodeBlock, copied, share_statistics, statistics_of
 from sdnn.training.interfaces import (
     LONG,
@@ -109,8 +109,7 @@ class _LearnerForAll(ObservingLearner):
             observations[i], actions[i], reward, next_observations[i], terminates, mask, dt
         )
         self._learner.learn(step, **self.arguments[i])
-        is_over = terminated[i] or truncated[i]
-        if goal is not None and self.progressing is not None and not is_over:
+        if not (goal is None or self.progressing is None or terminated[i] or truncated[i]):
             self.progressing.progress = (n_steps + 1) / goal
         return 1
 
@@ -240,7 +239,7 @@ class TrainingLoop(abc.ABC):
     def _begin(self) -> None:
         """Prepare the loop: the first evaluation, the callbacks and the next pause."""
         if self._lacks_evaluation:
-            self._report([self._evaluate()])
+            self._report(self._evaluate())
         n_environments = self._episodes.n_environments
         if getattr(self.agent, "n_environments", 1) != n_environments and not self.is_finished:
             self.agent.n_environments = n_environments
@@ -326,11 +325,10 @@ class TrainingLoop(abc.ABC):
         self._set_progress(is_over)
         if (is_over or is_called) and self._lacks_evaluation:
             try:
-                rows.append(self._evaluate())
+                rows += self._evaluate()
             except Exception as error:
                 failure = error
-        if rows:
-            self._report(rows)
+        self._report(rows)
         if is_called:
             for interval, callback in self._listeners:
                 if self.n_steps % interval == 0:
@@ -359,11 +357,10 @@ class TrainingLoop(abc.ABC):
 
     @property
     def is_finished(self) -> bool:
-        """Whether all steps or episodes are done."""
-        if self.steps is not None:
-            return self.n_steps >= self.steps
-        assert self.episodes is not None
-        return self.n_episodes >= self.episodes
+        """Whether all steps or episodes are done, and all evaluations."""
+        goals = (self.n_steps, self.steps), (self.n_episodes, self.episodes)
+        is_reached = any(goal is not None and n >= goal for n, goal in goals)
+        return is_reached and not self._lacks_evaluation
 
     def stop(self) -> None:
         """Stop after the present step, or before the first one of the next `run`."""
@@ -378,18 +375,21 @@ class TrainingLoop(abc.ABC):
             return len(self.evaluations) < self.n_episodes // self.evaluate_every_episodes
         return False
 
-    def _evaluate(self) -> Row:
-        """Evaluate the agent, with the present statistics of wrappers; return the row."""
+    def _evaluate(self) -> list[Row]:
+        """Return the row of an evaluation; none where `stop` defers it to the next `run`."""
         share_statistics(self.env, self.evaluation_env)
-        evaluation = evaluate(
+        evaluation = greedy_episodes(
             self.agent,
             self.evaluation_env,
             self.evaluation_episodes,
             seed=self.seed,
             options=self._options(self.n_episodes),
+            should_stop=lambda: self._stops,
         )
+        if evaluation is None:
+            return []
         self.evaluations.append((self.n_steps, evaluation.mean_return))
-        return self._row("evaluation", episode=self.n_episodes, **evaluation.row())
+        return [self._row("evaluation", episode=self.n_episodes, **evaluation.row())]
 
     def _episode_row(self, environment: int) -> Row:
         """Return the row of the episode that has ended in an environment."""

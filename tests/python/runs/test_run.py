@@ -2,7 +2,9 @@
 
 import errno
 import json
+import os
 import random
+import signal
 import subprocess
 import sys
 import time
@@ -13,13 +15,14 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-import drifting_env  # noqa: F401
+import drifting_env
 from processes import python
 from refusals import refuses
 from run_specs import run_spec
 from sdnn.agents import Callback, Training, load_agent
 from sdnn.reproduction import paper_spec
 from sdnn.runs import ConfigError, EnvironmentSpec, Run, RunError, RunSpec
+from sdnn.runs.errors import RunTerminatedError
 from sdnn.runs.store import ResultStore
 from sdnn.runs.trial import TrialRows
 from sdnn.support.files import lock
@@ -116,6 +119,30 @@ def test_a_run_stopped_at_any_step_resumes_exactly(whole, tmp_path, config):
     for step in steps:  # almost always within an episode
         outcome = Run.open(run.folder).train(callbacks=[Stop(step)])
         assert (outcome.n_steps, outcome.reason) == (step, "stopped")
+    assert Run.open(run.folder).train().reason == "done"
+    assert contents(run) == expected
+
+
+@pytest.mark.parametrize("steps", [400, 90], ids=["the first evaluation", "the last one"])
+def test_sigterm_ends_an_evaluation_which_the_resumed_run_repeats(
+    whole, tmp_path, monkeypatch, steps
+):
+    config = run_spec(WARMING_UP, steps=steps)
+    expected = contents(whole(config))
+    run = Run.create(tmp_path / "run", config)
+    n_steps, step = [], drifting_env.DriftingEnv.step
+
+    def terminate_in_evaluation(env, action):
+        n_steps.append(env)
+        if len(n_steps) == 90 + 5:  # the fifth step of the evaluation after 90 steps
+            os.kill(os.getpid(), signal.SIGTERM)
+        return step(env, action)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(drifting_env.DriftingEnv, "step", terminate_in_evaluation)
+        with pytest.raises(RunTerminatedError):
+            run.train()
+    assert len(n_steps) == 95
     assert Run.open(run.folder).train().reason == "done"
     assert contents(run) == expected
 
