@@ -220,7 +220,7 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
             "seed": self.seed,
         }
         if self.n_learned:
-            facts["learned"] = f"{self.n_learned:,} steps"
+            facts["observed" if self.is_warming_up else "learned"] = f"{self.n_learned:,} steps"
         if self._returns:
             facts["last return"] = f"{self._returns[-1]:.5g}"
         return facts

@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import re
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
@@ -349,8 +350,8 @@ Dataset: TypeAlias = str | Path | Mapping[str, Any] | Iterable[Any] | MinariData
 def learn_from(agent: AnyAgent, dataset: Dataset, *, epochs: int = 1) -> int:
     """Learn logged transitions in their order. All of them are checked before any is learned.
 
-    An agent without ranges takes its warm-up from the first transitions. ``agent.progress`` stays
-    as it is.
+    An agent without ranges takes its warm-up from the first transitions; a warning says where that
+    needs more. ``agent.progress`` stays as it is.
 
     Parameters
     ----------
@@ -402,6 +403,13 @@ def learn_from(agent: AnyAgent, dataset: Dataset, *, epochs: int = 1) -> int:
         return 0
     for _ in range(epochs):
         learn_log(agent, read())
+    if agent.is_warming_up:
+        warnings.warn(
+            "agent is still warming up after dataset: it has observed it, but learned nothing yet."
+            f" Give {agent._n_warm_up_steps_left} more transitions, more epochs, or make the agent"
+            " with observation_range",
+            stacklevel=3,
+        )
     return n * epochs
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
@@ -87,7 +88,8 @@ def evaluate(
 ) -> Evaluation:
     """Run greedy episodes, in which nothing is learned and nothing of the agent's future changes.
 
-    An episode that seems not to end is warned of. Random draws for greedy actions come from a stream that runs on from call to call
+    An episode that seems not to end is warned of, and an agent in its warm-up, whose actions are
+    all random. Random draws for greedy actions come from a stream that runs on from call to call
     and that learning does not use. Wrappers that learn, such as ``NormalizeObservation``, keep
     their statistics; those that have seen nothing get what the agent's training had learned, else
     they are warned of.
@@ -117,6 +119,12 @@ def evaluate(
         `ValueError` that names step and episode.
     """
     has_methods("agent", agent, "an agent", "act")
+    if getattr(agent, "is_warming_up", False):
+        warnings.warn(
+            "agent is still warming up: it acts at random and has learned nothing yet. Train or"
+            " learn more, or make it with observation_range",
+            stacklevel=3,
+        )
     evaluation = greedy_episodes(agent, env, episodes, seed=seed, options=options)
     assert evaluation is not None  # nothing stops it
     return evaluation
@@ -131,7 +139,7 @@ def greedy_episodes(
     options: Data | None,
     should_stop: Callable[[], bool] | None = None,
 ) -> Evaluation | None:
-    """Evaluate like `evaluate`.
+    """Evaluate like `evaluate`, without its warning of a warm-up.
 
     None where ``should_stop``, which is called in each step, returns True. The agent's state is
     that from before then, and after an error, so that the same evaluation can be made later.

@@ -183,7 +183,8 @@ def test_a_training_with_masks_resumes_exactly(
 
 
 def test_masks_in_a_log_file_are_learned_like_those_of_transitions(tmp_path):
-    agents = [new_agent(SDNNQLambda, Masked()) for _ in range(2)]
+    ranges = {"observation_range": (-1.0, 1.0), "inputs": "all", "angle_pairs": "none"}
+    agents = [new_agent(SDNNQLambda, Masked(), **ranges) for _ in range(2)]
     transition = Transition([0.1, 0.2], 1, 1.0, [0.3, 0.4], False, [1, 0, 0, 1, 0])
     learn_from(agents[0], [transition] * 3)
     path = tmp_path / "log.jsonl"
@@ -251,6 +252,7 @@ class Forgetful(gym.Wrapper):
         return (*results, {} if self.unwrapped.n_steps == 4 else info)
 
 
+@pytest.mark.filterwarnings("ignore:agent is still warming up")
 def test_missing_or_misshapen_masks_of_environments_are_unusable_steps():
     env = ActionMasks(gym.make("CartPole-v1"))  # CartPole has no masks
     agent = SDNNQLambda(env)

@@ -1,4 +1,4 @@
-"""Learning from minari_episodes logged_transitions: files, log_as_arrays, datasets of Minari."""
+"""Learning from logged transitions: files, arrays, datasets of Minari."""
 
 import json
 from types import SimpleNamespace
@@ -9,7 +9,14 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from refusals import refuses
-from sdnn.agents import FuzzyQLearning, RBFQLearning, SDNNQLambda, Transition, learn_from
+from sdnn.agents import (
+    FuzzyQLearning,
+    RBFQLearning,
+    SDNNQLambda,
+    Transition,
+    evaluate,
+    learn_from,
+)
 from sdnn.approximators import LinearSDNNConfig
 from stopped_training import states_equal
 
@@ -123,7 +130,7 @@ def test_lines_that_are_no_transition_are_refused_with_their_number(tmp_path, li
     path = write_log(tmp_path / "log.jsonl")
     path.write_text(path.read_text() + line + "\n")
     agent = new_agent()
-    error = refuses("41", learn_from, agent, path)  # after the 40 write_log of the log
+    error = refuses("41", learn_from, agent, path)  # after the 40 lines of the log
     assert "line" in str(error)
     assert states_equal(agent, new_agent())  # nothing is learned
 
@@ -136,6 +143,30 @@ def test_without_a_column_of_next_observations_those_of_the_next_row_are_learned
     del columns["next_observations"]
     assert learn_from(agent, columns) == 39
     assert np.array_equal(agent.readout.weights(), other.readout.weights())
+
+
+def test_a_log_that_does_not_end_the_warm_up_is_warned_of():
+    agent = new_agent(observation_range="adaptive", warm_up_steps=100)
+    with pytest.warns(UserWarning, match="60"):  # the log has 40 transitions
+        learn_from(agent, log_as_arrays())
+    assert agent.is_warming_up
+    assert "learned" not in repr(agent)
+    with pytest.warns(UserWarning, match="warming up"):
+        evaluate(agent, RandomPlaces(), 1)
+    learn_from(agent, log_as_arrays(), epochs=2)
+    assert "learned 120 steps" in repr(agent)
+    evaluate(agent, RandomPlaces(), 1)  # without a warning
+
+
+class RandomPlaces(gym.Env):
+    observation_space, action_space = PLACE, BUTTONS
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        return self.np_random.uniform(-1, 1, 2), {}
+
+    def step(self, action):
+        return self.np_random.uniform(-1, 1, 2), 1.0, True, False, {}
 
 
 def test_a_line_beyond_a_megabyte_is_refused(tmp_path):
