@@ -65,6 +65,10 @@ class StopTrainingOnRewardThreshold(Callback):
             raise ValueError("mean_return must be a number, got NaN")
         self.patience = whole("patience", patience, 1, 2**53)
 
+    def on_start(self, training: Training) -> None:
+        """Refuse a training without evaluations."""
+        _require_evaluations(self, training)
+
     def on_row(self, training: Training, row: Row) -> None:
         """Stop the training once the threshold is reached."""
         if row["kind"] == "evaluation" and self.is_reached(training):
@@ -98,8 +102,10 @@ class SaveBestAgent(Callback):
         self.episodes = None if episodes is None else whole("episodes", episodes, 1, MOST_IN_BLOCK)
 
     def on_start(self, training: Training) -> None:
-        """Let the training compare blocks of ``episodes`` episodes, if they are given."""
-        if self.episodes is not None:
+        """Let the training compare blocks of ``episodes`` episodes, or require evaluations."""
+        if self.episodes is None:
+            _require_evaluations(self, training, ", or episodes=20 of SaveBestAgent")
+        else:
             training.blocks.setdefault(self.episodes, EpisodeBlock(self.episodes))
 
     def on_row(self, training: Training, row: Row) -> None:
@@ -119,10 +125,23 @@ class StopTrainingOnNoImprovement(Callback):
     def __init__(self, max_evaluations: int) -> None:
         self.max_evaluations = whole("max_evaluations", max_evaluations, 1, 2**53)
 
+    def on_start(self, training: Training) -> None:
+        """Refuse a training without evaluations."""
+        _require_evaluations(self, training)
+
     def on_row(self, training: Training, row: Row) -> None:
         """Count the evaluations since the best one."""
         if row["kind"] == "evaluation" and n_since_best(training) >= self.max_evaluations:
             training.stop()
+
+
+def _require_evaluations(callback: Callback, training: Training, remedy: str = "") -> None:
+    """Raise ValueError for a training without evaluations, in which a callback does nothing."""
+    if training.evaluate_every is None and training.evaluate_every_episodes is None:
+        raise ValueError(
+            f"evaluate_every must be given for {type(callback).__name__}, which compares"
+            f" evaluations, got None: give evaluate_every and evaluation_env{remedy}"
+        )
 
 
 def n_since_best(training: Training) -> int:

@@ -434,6 +434,18 @@ def test_two_evaluations_in_a_row_without_improvement_stop_a_training():
     refuses("max_evaluations", StopTrainingOnNoImprovement, 0)
 
 
+def test_callbacks_that_compare_evaluations_are_refused_where_there_are_none(trained, tmp_path):
+    agent, env, _ = trained
+    for callback in (
+        SaveBestAgent(tmp_path / "best"),
+        StopTrainingOnRewardThreshold(1.0),
+        StopTrainingOnNoImprovement(1),
+    ):
+        n_learned = agent.n_learned
+        refuses("evaluate_every", agent.train, env, steps=5, callbacks=[callback])
+        assert agent.n_learned == n_learned
+
+
 @pytest.mark.parametrize("interval", [0, -1, 2.5, None])
 def test_step_intervals_below_1_and_fractions_are_refused(trained, interval):
     class WithBadInterval(Callback):
