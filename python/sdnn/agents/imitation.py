@@ -9,7 +9,8 @@ from typing import TypeAlias
 
 from sdnn import _core
 from sdnn.agents.actor_critic import SDNNActorCritic
-from sdnn.agents.datasets import Dataset, Logged, checked_length, learn_log, reader_of, with_action
+from sdnn.agents.datasets import Dataset, checked_length, learn_log, with_action
+from sdnn.agents.logs import Logged, reader_of
 from sdnn.agents.q_lambda import SDNNQLambda
 from sdnn.support.arguments import is_of_class, require, whole
 from sdnn.training.interfaces import Transition, explained

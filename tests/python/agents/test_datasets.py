@@ -124,7 +124,7 @@ def test_files_and_episodes_of_dict_observations_are_learned_and_end_a_warm_up(t
 
 
 @pytest.mark.parametrize(
-    "line", ["", "7", "{}", "[" * 9999, '{"observation": [0, 0]}', "nonsense", "\x00", "NaN"]
+    "line", ["7", "{}", "[" * 9999, '{"observation": [0, 0]}', "nonsense", "\x00", "NaN"]
 )
 def test_lines_that_are_no_transition_are_refused_with_their_number(tmp_path, line):
     path = write_log(tmp_path / "log.jsonl")
@@ -143,6 +143,64 @@ def test_without_a_column_of_next_observations_those_of_the_next_row_are_learned
     del columns["next_observations"]
     assert learn_from(agent, columns) == 39
     assert np.array_equal(agent.readout.weights(), other.readout.weights())
+
+
+def table(path, text, **encoding):
+    names = "observation_0,observation_1,action,reward,next_observation_0,next_observation_1"
+    path.write_text(names + ",terminated\n" + text, **encoding)
+    return path
+
+
+def test_empty_cells_and_null_in_files_are_missing_readings(tmp_path):
+    csv = table(tmp_path / "log.csv", "0,,1,1.0,0.5,,False\n0.5,,2,1.0,0.25, ,True\n")
+    jsonl = tmp_path / "log.jsonl"
+    row = {"observation": [0, None], "action": 1, "reward": 1, "next_observation": [0.5, None]}
+    last = {"observation": [0.5, None], "action": 2, "reward": 1, "next_observation": [0.25, None]}
+    jsonl.write_text("".join(json.dumps(r) + "\n" for r in (row, last | {"terminated": True})))
+    here, after, end = [0.0, np.nan], [0.5, np.nan], [0.25, np.nan]
+    log = [Transition(here, 1, 1.0, after, False), Transition(after, 2, 1.0, end, True)]
+    settings = {"history": "none", "observation_range": (-1, 1)}
+    agents = [new_agent(missing="hold", **settings) for _ in range(3)]
+    for agent, dataset in zip(agents, (log, csv, jsonl), strict=True):
+        assert learn_from(agent, dataset) == 2
+        assert states_equal(agent, agents[0])
+        refuses("dataset", learn_from, new_agent(), dataset)  # missing="error"
+    csv = table(csv, "0,0,,1.0,0.5,0,False\n")  # without an action
+    refuses("line", learn_from, agents[0], csv)
+
+
+def test_a_byte_order_mark_and_blank_lines_are_skipped(tmp_path):
+    agents = [new_agent(history="none", observation_range=(-1, 1)) for _ in range(3)]
+    learn_from(agents[0], [Transition([0, 0], 1, 1.0, [0.5, 0], True)])
+    text = "\n0,0,1,1.0,0.5,0,True\n\n"
+    learn_from(agents[1], table(tmp_path / "log.csv", text, encoding="utf-8-sig"))
+    path = tmp_path / "log.jsonl"
+    row = {"obs": [0, 0], "act": 1, "rew": 1.0, "next_obs": [0.5, 0], "done": True}
+    path.write_text(f"\n{json.dumps(row)}\n \n")
+    learn_from(agents[2], path)
+    assert states_equal(agents[0], agents[1])
+    assert states_equal(agents[0], agents[2])
+
+
+@pytest.mark.parametrize("names", ["0,0,1,1", "observation_0,action", "action,action,reward"])
+def test_wrong_names_of_a_table_are_reported_in_their_line(tmp_path, names):
+    path = tmp_path / "log.csv"
+    for rows in ("", "0,0,0,0\n"):
+        path.write_text(names + "\n" + rows)
+        assert "line 1 " in str(refuses("dataset", learn_from, new_agent(), path))
+
+
+def test_rows_of_json_without_next_observations_follow_each_other(tmp_path):
+    agents = [new_agent(history="none", observation_range=(-1, 1)) for _ in range(2)]
+    path = lines(tmp_path / "log.jsonl")
+    log = [json.loads(line) for line in path.read_text().splitlines()[:30]]
+    rows = [{n: v for n, v in row.items() if n != "next_observation"} for row in log]
+    path.write_text("".join(json.dumps(row) + "\n" for row in rows))
+    assert learn_from(agents[0], path) == learn_from(agents[1], log) == 30
+    assert np.array_equal(*(agent.readout.weights() for agent in agents))
+    rows[4]["terminated"] = "perhaps"
+    path.write_text("".join(json.dumps(row) + "\n" for row in rows))
+    assert "line 5:" in str(refuses("terminated", learn_from, agents[0], path))
 
 
 def test_a_log_that_does_not_end_the_warm_up_is_warned_of():
