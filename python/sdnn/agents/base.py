@@ -34,12 +34,10 @@ from sdnn.environments.spaces import (
     Missing,
     Observations,
     Ranges,
-    space_of_error,
+    controller_error,
 )
 from sdnn.environments.types import Element, Mask, Space
 from sdnn.support.arguments import (
-    argument_error,
-    blamed,
     choice,
     duration_of,
     flag,
@@ -191,11 +189,7 @@ class BaseAgent(Advised, abc.ABC, Generic[Approximator, Learning]):
                 **made_of,
             )
         except ValueError as error:
-            reason = space_of_error(error, self._observations, self._actions)
-            if not reason:
-                raise
-            argument, problem = blamed(error)
-            raise argument_error(argument, f"{problem} ({reason})") from error
+            raise controller_error(error, self._observations, self._actions) from None
 
     @property
     def approximator(self) -> Approximator:

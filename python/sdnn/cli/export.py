@@ -276,15 +276,19 @@ def _estimator_in(source: Path) -> Fitted | None:
 
 
 def _coarse_ranges(agent: AnyAgent, fraction_bits: int) -> Iterator[str]:
-    """Describe the ranges in which an observation in fixed point has few values, a line each."""
-    low, high = agent.observation_range
-    for variable in sorted({at[0] for kind, at in agent.inputs if kind == "variable"}):
-        n_steps = float(high[variable] - low[variable]) * 2.0**fraction_bits
+    """Describe ranges of observations and actions with few values in fixed point, a line each."""
+    variables = sorted({at[0] for kind, at in agent.inputs if kind == "variable"})
+    ranges = [("observation", "observe", i, *(b[i] for b in agent.observation_range))
+              for i in variables]  # fmt: skip
+    if not agent._action.discrete:
+        bounds = zip(agent._action.low, agent._action.high, strict=True)
+        ranges += [("action", "give", i, low, high) for i, (low, high) in enumerate(bounds)]
+    for name, verb, i, low, high in ranges:
+        n_steps = float(high - low) * 2.0**fraction_bits
         if n_steps < _FEW_STEPS:
             yield (
-                f"observation[{variable}], from {low[variable]:g} to {high[variable]:g}, has a"
-                f" range of only {n_steps:.2g} times 2^-{fraction_bits}: observe it in another"
-                " unit, or with more --fraction-bits"
+                f"{name}[{i}], from {low:g} to {high:g}, has a range of only {n_steps:.2g} times"
+                f" 2^-{fraction_bits}: {verb} it in another unit, or with more --fraction-bits"
             )
 
 

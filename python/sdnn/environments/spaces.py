@@ -313,7 +313,18 @@ class Actions:
             raise ValueError(f"action must be in {self.space}, got {shown(action)}") from None
 
 
-def space_of_error(error: ValueError, observations: Observations, actions: Actions) -> str:
+def controller_error(error: ValueError, observations: Observations, actions: Actions) -> Exception:
+    """Return an error of the core about a setting, or about a size that follows from a space."""
+    argument, problem = blamed(error)
+    if argument == "n_units":  # of the core's patterns
+        return argument_error("n_pattern_units", problem)
+    reason = _space_of_size(argument, error, observations, actions)
+    return argument_error(argument, f"{problem} ({reason})") if reason else error
+
+
+def _space_of_size(
+    argument: str, error: ValueError, observations: Observations, actions: Actions
+) -> str:
     """Return a remark that names the space from which the size in an error follows, or ""."""
     reasons = {"n_inputs": "n_inputs follows from observation_space"}
     if observations.n_variables > _MANY_VARIABLES:
@@ -325,7 +336,6 @@ def space_of_error(error: ValueError, observations: Observations, actions: Actio
         reasons["n_actions"] = "n_actions follows from action_space"
     if len(actions.config.low) > 1:
         reasons["max_table_bytes"] = "for each dimension of action_space"
-    argument, _ = blamed(error)
     if argument.startswith("action."):
         return "of action_space"
     matches = [reason for word, reason in reasons.items() if word in str(error)]

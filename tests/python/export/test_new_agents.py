@@ -187,6 +187,15 @@ def test_export_refuses_a_run_together_with_options_of_new_agents(export):
     assert export("one.safetensors", "--learning").exit_code == 0
 
 
+def test_a_single_pattern_unit_is_refused_by_the_option_that_gave_it(refused):
+    option = ("--set", "approximator.n_pattern_units=1")
+    new = ("export", "--new", "--range", "0:1", "--actions", 2, "--c-header", "a.h")
+    for command in (new, ("train", "CartPole-v1")):
+        assert option[0] + " approximator.n_pattern_units" in refused(*command, *option, code=2)
+    few = LinearSDNNConfig(n_pattern_units=1)
+    refuses("n_pattern_units", SDNNQLambda, SPACE, TWO_ACTIONS, approximator=few)
+
+
 def test_ranges_that_fixed_point_hardly_resolves_are_named(invoke):
     new = ("export", "--new", "--actions", 2, "--c-header", "a.h", "--range", "0:1")
     assert "warning" not in invoke(*new, "--range", "-0.01:0.01").output
@@ -197,5 +206,11 @@ def test_ranges_that_fixed_point_hardly_resolves_are_named(invoke):
         amperes.output
     )
     assert "warning" not in invoke(*new, "--range", "0:0.0001", "--fraction-bits", 24).output
+    motor = ("export", "--new", "--c-header", "a.h", "--range", "0:1", "--actions", "-4e-6:4e-6")
+    # 8 10^-6 2^16 = 0.524
+    assert "warning: action[0], from -4e-06 to 4e-06, has a range of only 0.52 times 2^-16" in (
+        invoke(*motor).output
+    )
+    assert "warning" not in invoke(*motor, "--fraction-bits", 24).output
     # 10^9 leaves a bit, and 2 steps from 0 to 1
     assert "observation[0], from 0 to 1," in invoke(*new, "--range", "0:1e9").output
