@@ -286,7 +286,7 @@ class BaseAgent(Advised, abc.ABC, Generic[Approximator, Learning]):
         allowed = self._actions.mask("mask", mask)
         numbers = self._controller.act(variables, explore, environment, allowed)
         self._actions.has_masks |= explore and allowed is not None
-        return self._actions.elements(numbers)[0]
+        return self._actions.element(numbers)
 
     def flat_observation(self, observation: Element) -> NDArray[np.float64]:
         """Return the observed variables as a vector, shape (n_variables,), in their own units.

@@ -227,6 +227,9 @@ def spaces_of(observed: Observed | str, actions: Space | None) -> tuple[Space, S
             return spaces_of(env, None)
     has_spaces = _space_of(observed, "observation_space") is not None
     expected = "be a Gymnasium space, or in its place an environment or its id"
+    if isinstance(actions, gym.Space) and (has_spaces or isinstance(observed, str)):
+        expected = "be omitted where observation_space is an environment or its id"
+        require(False, "action_space", expected, actions, TypeError)
     if isinstance(observed, str):  # as before an environment in other libraries
         expected += ", which come first, without a policy: SDNNQLambda(env)"
     is_space = isinstance(observed, gym.Space) or (has_spaces and actions is None)

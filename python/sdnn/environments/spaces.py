@@ -261,6 +261,11 @@ class Actions:
         """Make an element of the space from each row of numbers."""
         return numbers.astype(self._dtype).reshape((-1, *self._shape))
 
+    def element(self, numbers: NDArray[np.float64]) -> Array:
+        """Make an element of the space; of a Box always an array."""
+        element = self.elements(numbers)[0]
+        return np.asarray(element) if self.is_box else element
+
     def batch(self, elements: Elements) -> Array:
         """Make an array of elements of the space, with zeros for None."""
         actions = np.zeros((len(elements), *self._shape), self._dtype)

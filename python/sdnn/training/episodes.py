@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 
 from sdnn.environments.types import AnyEnv, Data, Element, Elements, Env, Info, Mask, Masks
@@ -130,7 +131,9 @@ class SingleEnvironment(EnvironmentAdapter):
     can_repeat = True
 
     def __init__(self, env: Env) -> None:
-        self._env = env
+        self._env, space = env, env.action_space
+        is_scalar = isinstance(space, gym.spaces.Box) and space.shape == ()
+        self._copied: Callable[[Element], Element] = np.array if is_scalar else copied
         self.rewards, self.terminated, self.truncated = [0.0], [False], [False]
         self.masks = [None] if announces(env, "action_masks") else None
         self.dts = [1.0] if announces(env, "durations") else None
@@ -144,7 +147,7 @@ class SingleEnvironment(EnvironmentAdapter):
 
     def take(self, action: Element) -> tuple[Element, float, bool, bool]:
         """Step the environment; return observation, reward, terminated and truncated."""
-        observation, reward, terminated, truncated, info = step_env(self._env, copied(action))
+        observation, reward, terminated, truncated, info = step_env(self._env, self._copied(action))
         is_usual = type(reward) is float and type(terminated) is bool is type(truncated)
         if not (is_usual and math.isfinite(reward)):
             reward, terminated, truncated = checked_outcome(reward, terminated, truncated)

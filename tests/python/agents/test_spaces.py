@@ -8,7 +8,7 @@ import pytest
 from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete, Tuple
 
 from refusals import refuses
-from sdnn.agents import FuzzyQLearning, RBFQLearning, SDNNQLearning, load_agent
+from sdnn.agents import FuzzyQLearning, RBFQLearning, SDNNQLambda, SDNNQLearning, load_agent
 from sdnn.environments.space_kinds import require_same_kind, space_of
 
 PLANE = Box(-1.0, 1.0, (2,))
@@ -102,6 +102,32 @@ def test_other_bounds_are_named_and_can_be_accepted_by_setting_the_space(tmp_pat
     for loaded in (agent, load_agent(tmp_path / "agent")):
         require_same_kind(loaded, env)
         assert loaded.observation_range[1][-1] == 1.0
+
+
+def test_an_action_space_beside_an_environment_is_refused():
+    env = gym.make("CartPole-v1")
+    for observed in (env, "CartPole-v1"):
+        refuses("action_space", SDNNQLambda, observed, env.action_space, error=TypeError)
+
+
+def test_actions_of_a_box_without_dimensions_are_arrays(tmp_path):
+    actions = []
+
+    class Push(gym.Env):
+        observation_space, action_space = gym.spaces.Box(-1, 1, (1,)), gym.spaces.Box(-1, 1, ())
+
+        def reset(self, *, seed=None, options=None):
+            return np.zeros(1, np.float32), {}
+
+        def step(self, action):
+            actions.append(action)
+            return np.zeros(1, np.float32), 1.0, True, False, {}
+
+    agent = SDNNQLambda(Push(), observation_range=(-1, 1), inputs="all", seed=1)
+    agent.train(Push(), steps=3)
+    agent.train(gym.vector.SyncVectorEnv([Push]), steps=3)
+    actions.append(agent.act(np.zeros(1)))
+    assert all(type(action) is np.ndarray and action.shape == () for action in actions)
 
 
 class Colour(enum.Enum):
