@@ -215,13 +215,14 @@ def flag(name: str, value: object) -> bool:
     return bool(value)
 
 
-def path_of(name: str, value: object) -> Path:
-    """Check that an argument can name a file; TypeError or ValueError if not."""
+def path_of(name: str, value: object, *, is_folder: bool = False) -> Path:
+    """Check that an argument can name a file, or a folder; TypeError or ValueError if not."""
     text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
-    if isinstance(text, str) and text and "\0" not in text:
+    if isinstance(text, str) and text and "\0" not in text and (Path(text).name or is_folder):
         return Path(text)
     error_class = TypeError if text is None else ValueError
-    raise argument_error(name, f"must be the name of a file, got {shown(value)}", error_class)
+    expected = "must be the name of a " + ("folder" if is_folder else "file")
+    raise argument_error(name, f"{expected}, got {shown(value)}", error_class)
 
 
 def is_of_class(value: object, expected: type) -> bool:

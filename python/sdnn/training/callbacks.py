@@ -263,7 +263,7 @@ class TensorBoard(Callback):
     """Writes the numbers of each row for TensorBoard; needs ``tensorboardX`` or ``torch``."""
 
     def __init__(self, folder: str | Path) -> None:
-        self.folder = path_of("folder", folder)
+        self.folder = path_of("folder", folder, is_folder=True)
         self._make = _summary_writer()
 
     def on_start(self, training: Training) -> None:

@@ -18,10 +18,13 @@ import agent_files
 from refusals import refuses
 from sdnn import SDNNRegressor
 from sdnn.agents import (
+    CheckpointCallback,
     FuzzyQLearning,
     FuzzyQLearningConfig,
+    JSONLines,
     QLearningConfig,
     RBFQLearning,
+    SaveBestAgent,
     SDNNActorCritic,
     SDNNQLambda,
     SDNNQLearning,
@@ -125,6 +128,13 @@ def run_steps(agent, first, last, copied_step=None, when="", copy_of=None):
 def check_same_agent(first, second):
     assert states_equal(first, second)
     assert first.description() == second.description()
+
+
+@pytest.mark.parametrize("path", [".", "/", ""])
+def test_paths_without_a_name_are_refused(path):
+    agent = SDNNQLambda(gym.spaces.Box(-1, 1, (2,)), gym.spaces.Discrete(3))
+    for use in (agent.save, JSONLines, CheckpointCallback, SaveBestAgent, load_agent):
+        refuses("path", use, path)
 
 
 @pytest.mark.parametrize(("n_environments", "n_copies"), [(1, 100), (4, 24)])
