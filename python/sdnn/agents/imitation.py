@@ -19,6 +19,7 @@ LinearAgent: TypeAlias = SDNNQLambda | SDNNActorCritic
 Steps: TypeAlias = Sequence[Transition]
 
 _MOST_STEPS = 10_000  # the number of steps that are in memory at once; longer episodes are split
+_LARGEST_RETURN = 1e300
 
 
 @explained
@@ -73,9 +74,9 @@ def imitate(agent: SDNNQLambda | SDNNActorCritic, dataset: Dataset, *, epochs: i
     n = checked_length(agent, read())
     if n == 0:
         return 0
+    margin = _margin(agent, read)
     if agent.is_warming_up:
         _end_warm_up(agent, read())
-    margin = _margin(agent, read)
     for _ in range(epochs):
         for steps, terminated in _episodes(agent, read()):
             last_value = 0.0 if terminated else _value(agent, steps)
@@ -138,11 +139,18 @@ def _margin(agent: LinearAgent, read: Callable[[], Iterator[Logged]]) -> float:
     """Return the root mean square of the returns, or 1 where all are 0.
 
     Imitation makes other actions worse by at least this margin. Less would let the noise
-    of later learning undo what was imitated.
+    of later learning undo what was imitated. ValueError for returns that cannot be learned.
     """
-    total, n = 0.0, 0
+    total, n, largest = 0.0, 0, 0.0
     for steps, _ in _episodes(agent, read()):
         returns = _returns(agent, steps, 0.0)
         total, n = total + sum(value * value for value in returns), n + len(returns)
+        largest = max(largest, *map(abs, returns))
+    expected = "have rewards whose discounted sums are within 1e300: divide them by a number"
+    require(largest <= _LARGEST_RETURN, "dataset", expected, largest)
+    if math.isinf(total):  # squares of the returns are too large
+        episodes = (_returns(agent, steps, 0.0) for steps, _ in _episodes(agent, read()))
+        total = sum((value / largest) ** 2 for returns in episodes for value in returns)
+        return largest * math.sqrt(total / n)
     size = math.sqrt(total / n)
     return size if size > 0.0 else 1.0

@@ -82,6 +82,17 @@ def test_actions_of_any_space_are_imitated_at_any_size_of_rewards(agent_class, s
     assert np.mean(is_imitated) > 0.95
 
 
+def test_rewards_whose_squares_overflow_are_imitated_and_larger_returns_refused():
+    agent, other = (SDNNQLambda(gym.spaces.Box(-1, 1, (2,)), gym.spaces.Discrete(3)) for _ in "ab")
+    refuses("dataset", imitate, agent, [([0, 0], 1, 1e300, [0, 0], False)] * 3)
+    assert agent.is_warming_up
+    imitate(agent, [([0, 0], 1, 1e160, [0, 0], True)])
+    imitate(other, [([0, 0], 1, 1.0, [0, 0], True)])
+    for imitator in (agent, other):
+        assert imitator.act([0, 0], explore=False) == 1
+    assert agent.q_values([0, 0])[1] == pytest.approx(1e160 * other.q_values([0, 0])[1], rel=0.01)
+
+
 def value_of(agent, observation):
     if isinstance(agent, SDNNActorCritic):
         return agent.value(observation)
