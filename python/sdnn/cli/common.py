@@ -49,7 +49,7 @@ def option_of(key: str) -> str:
     key = key.partition("[")[0]  # an option sets a whole list, not one of its items
     if key == "agent.name":
         return "--agent"
-    if key in (*KEYS, "steps", "episodes"):
+    if key in (*KEYS, "steps", "episodes", "baseline"):
         return "--" + key.rpartition(".")[2].replace("_", "-")
     if key.startswith("environment.kwargs"):
         return f"--env-arg {key[len('environment.kwargs.') :]}".rstrip()

@@ -187,8 +187,11 @@ def _options_by_key(env_id: str | None, options: common.Options) -> common.Optio
             set_once(f"--range {name}", f"environment.ranges.{name}", bounds)
     for name, text in common.named_values("--set", options["settings"]):
         if "." not in name:
-            example = advice(name, (), KEYS_BY_NAME) or "such as learning.discount"
-            raise click.UsageError(f"--set {name}: must be TABLE.NAME; {example}")
+            problem = "must be TABLE.NAME; "
+            problem += advice(name, (), KEYS_BY_NAME) or "such as learning.discount"
+            if KEYS_BY_NAME.get(name) == name:
+                problem = f"is not in a table: use {common.option_of(name)}"
+            raise click.UsageError(f"--set {name}: {problem}")
         set_once(f"--set {name}", name, common.value_of(text))
     return values
 

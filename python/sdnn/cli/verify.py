@@ -67,7 +67,7 @@ def verify(
     if certificate is not None and not certificate.absolute().parent.is_dir():
         raise click.UsageError(f"--certificate must be in a folder that exists, got {certificate}")
     consent = Consent(modules)
-    with run_command(str):
+    with run_command(lambda error: f"--{error}" if error.key == "case" else str(error)):
         consent.import_modules()
         reports = _reports(source, consent)
         with TrialBars(Console(stderr=True)) as observer:

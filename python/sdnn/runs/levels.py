@@ -14,7 +14,7 @@ import numpy as np
 
 from sdnn.environments.types import Element, Space
 from sdnn.runs.environment import EnvironmentSpec
-from sdnn.runs.errors import RunError
+from sdnn.runs.errors import ConfigError
 from sdnn.training.evaluation import greedy_episode
 
 MAX_EPISODES, MAX_STEPS = 20, 10_000
@@ -44,12 +44,14 @@ def levels_of(
 
     These are the goal of the environment's registration, unless arguments change the environment;
     the mean return of random actions, in environments of Gymnasium and of this package; and the
-    baselines that are named. With `plain` only these. RunError for a baseline that is not stored.
+    baselines that are named. With `plain` only these. ConfigError if a name is not that of a stored
+    baseline.
     """
     known = baseline_names()
     for name in baselines:
         if name not in known:
-            raise RunError(f"baseline must be one of {', '.join(map(repr, known))}, got {name!r}")
+            names = ", ".join(map(repr, known))
+            raise ConfigError("baseline", f"must be one of {names}, got {name!r}")
     levels, notes = [], []
     for task, environment in tasks.items():
         for title, measure in (("goal", goal_of), ("random actions", mean_random_return)):

@@ -295,7 +295,8 @@ class AgentSpec(Settings, frozen=True):
         Literal["none", "find"] | tuple[tuple[Index, Index], ...] | None,
         doc(
             "Which cosines and sines of an angle become one input: pairs of observed "
-            "variables, from 0, or those that the warm-up finds. By default `none`; of "
+            "variables, from 0 (`--set agent.angle_pairs=[[0,1]]`), or those that the warm-up "
+            "finds. By default `none`; of "
             "`q-lambda`, `find`, unless observations are scaled."
         ),
     ] = None
@@ -304,7 +305,8 @@ class AgentSpec(Settings, frozen=True):
         doc(
             "Which observed variables are inputs: `all`; those that the warm-up finds "
             "`relevant`; or a list, from 0, of some that are inputs in any case, beside the "
-            "relevant ones. By default `all`; of `q-lambda`, `relevant`."
+            "relevant ones (`--set agent.inputs=[0,1]`). By default `all`; of `q-lambda`, "
+            "`relevant`."
         ),
     ] = None
     warm_up_steps: Annotated[
@@ -314,8 +316,8 @@ class AgentSpec(Settings, frozen=True):
         Literal["error", "hold", "code"],
         doc(
             "Readings that are NaN, infinite or masked: `error` refuses them, `hold` uses the "
-            "variable's last reading, `code` has a pattern for them in each input (`q-lambda` "
-            "and `sdnn-c`)."
+            "variable's last reading, `code` has a pattern for them in each input (`q-lambda`, "
+            "`actor-critic` and `sdnn-c`)."
         ),
     ] = "error"
     history: Annotated[

@@ -126,14 +126,14 @@ def choose_trials(
 ) -> list[TrialKey]:  # fmt: skip
     """Draw trials at random, evenly over the cases, agents and configurations; None: all.
 
-    ``cases`` are ids of the cases to draw from; empty: all. ``seed`` repeats a draw. RunError if
+    ``cases`` are ids of the cases to draw from; empty: all. ``seed`` repeats a draw. ConfigError if
     no trial is of a case.
     """
     keys = sorted(keys)
     known = list(dict.fromkeys(key.case_id for key in keys))
     for case in cases:
         if case not in known:
-            raise RunError(f"case must be one of {', '.join(known)}, got {case!r}")
+            raise ConfigError("case", f"must be one of {', '.join(known)}, got {case!r}")
     groups: dict[tuple[str, str, str], list[TrialKey]] = {}
     for key in keys:
         if not cases or key.case_id in cases:

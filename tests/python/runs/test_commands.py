@@ -293,7 +293,9 @@ def test_plot_draws_goals_random_actions_and_baselines(invoke, refused, tmp_path
 
     assert levels() == ["goal", "random actions"]
     assert levels("--plain", "--baseline", "PPO", "--baseline", "RBFN") == ["PPO", "RBFN"]
-    assert "'PPO', 'SAC'" in refused("plot", "pole", "--baseline", "nobody", code=1)
+    message = refused("plot", "pole", "--baseline", "nobody", code=2)
+    assert "--baseline: " in message
+    assert "'PPO', 'SAC'" in message
 
 
 def test_plot_names_runs_without_rows(invoke):
@@ -437,6 +439,7 @@ def test_train_with_n_envs_learns_in_several_environments(invoke):
         ("--set learning.discount", "--set must be NAME=VALUE"),
         ("--set discount=1", "--set discount: must be TABLE.NAME"),
         ("--set learning.discont=1", "--set learning.discont: unknown"),
+        ("--set seed=1", "use --seed"),
         ("--set gamma=1", "did you mean learning.discount?"),
         ("--gamma 1", "--gamma: did you mean --set learning.discount=...?"),
         ("--set agent.angles=[7]", "--set agent.angles: must"),
@@ -730,6 +733,13 @@ def test_train_reports_observations_that_are_left_out(invoke):
     options[1] = "sdnn-c"  # uses all inputs by default
     lines = invoke("train", "drifting_env:tests/Crowded-v0", *options, "--out", "two").stdout
     assert "of 6 observations" not in lines
+
+
+def test_the_help_of_train_shows_how_lists_are_given(invoke):
+    text = re.sub(r"\s+", "", invoke("train", "--help").stdout)
+    for setting in ("agent.inputs=[0,1]", "agent.angle_pairs=[[0,1]]"):
+        assert f"--set{setting}" in text
+        assert invoke("train", "CartPole-v1", "--set", setting, "--dry-run").exit_code == 0
 
 
 def test_commands_report_an_unfinished_warm_up(invoke):

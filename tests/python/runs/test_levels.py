@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from refusals import refuses
-from sdnn.runs import EnvironmentSpec, RunError
+from sdnn.runs import ConfigError, EnvironmentSpec
 from sdnn.runs.levels import baseline_names, goal_of, levels_of, mean_random_return
 
 CARTPOLE = EnvironmentSpec(id="CartPole-v1")
@@ -62,4 +62,4 @@ def test_stored_baselines_are_those_of_the_unchanged_environment():
     assert notes == ["noisy: no stored return of PPO"]
     levels, _ = levels_of({"clean": CARTPOLE})
     assert [level.title for level in levels] == ["goal", "random actions"]
-    refuses("PPO", levels_of, {"clean": CARTPOLE}, ["ppo"], error=RunError)
+    refuses("PPO", levels_of, {"clean": CARTPOLE}, ["ppo"], error=ConfigError)

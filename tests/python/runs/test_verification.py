@@ -16,7 +16,7 @@ from refusals import refuses
 from sdnn.reproduction import plan_trials
 from sdnn.reproduction.cases import PAPER_CASES
 from sdnn.reproduction.reference import differences_from_paper
-from sdnn.runs import ResultStore, RunError, StoreError, run_trials
+from sdnn.runs import ConfigError, ResultStore, RunError, StoreError, run_trials
 from sdnn.runs.certificates import CertifiedReports, certify, write_certificate
 from sdnn.runs.engine import Finished, ThreadExecutor
 from sdnn.runs.reported import Consent, ReportedTrial, StoredReports
@@ -100,7 +100,7 @@ def test_trials_are_drawn_evenly_over_cases_and_the_same_by_a_seed(fake_store):
     assert len({tuple(choose_trials(keys, 2, seed=seed)) for seed in range(20)}) > 1
     assert {key.case_id for key in choose_trials(keys, None, cases=["s6"])} == {"s6"}
     assert choose_trials(keys, None) == keys
-    refuses("s9", choose_trials, keys, 1, cases=["s9"], error=RunError)
+    refuses("s9", choose_trials, keys, 1, cases=["s9"], error=ConfigError)
 
 
 @pytest.mark.parametrize("n_trials", [None, 1])
@@ -227,6 +227,7 @@ def test_modules_are_imported_with_consent_only(invoke, own_module):
     assert invoke("train", "my_envs:mine/Env-v0", "--steps", 100, *SMALL, "--out", "run").stdout
     own_module.unlink()
     del sys.modules["my_envs"]
+    assert invoke("verify", "run", "--case", "nowhere").exit_code == 2
     result = invoke("verify", "run")
     assert (result.exit_code, result.stdout) == (2, "")
     assert "--import my_envs" in result.stderr
