@@ -70,6 +70,7 @@ class ValueAgent(Agent[Approximator, Learning], abc.ABC, Generic[Approximator, L
     def q_values(self, observation: ArrayLike, dimension: int = 0) -> NDArray[np.float64]:
         """Return Q(observation, a) of every action of a dimension, shape (n_actions[dimension],).
 
+        Of several dimensions, Q of the whole action is the mean of these, of `SDNNQLambda` the sum.
         Greedy actions follow these values, from the averaged weights where there are any. Several
         threads may call it at once; `learn` waits for them.
 
