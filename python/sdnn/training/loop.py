@@ -1,8 +1,7 @@
 """The training loop, and the learners in it: act, step, learn, evaluate.
 
 In each round the agent acts in all environments, these step together, and the agent learns the
-outcomes in the environments' order. The round pauses where an episode ends, an evaluation is due or
-a callback is called.
+outcomes in their order. The round pauses where an episode ends, or an evaluation or call is due.
 """
 
 from __future__ import annotations
@@ -197,6 +196,7 @@ class TrainingLoop(abc.ABC):
     _learner: _LearnerForAll
     _listeners: Sequence[tuple[int, Any]]
     _stops: bool
+    _defers = False  # whether `stop` has ended an evaluation
 
     def pieces(self, seconds: float) -> Generator[None, None, None]:
         """Learn as `run` does, in pieces of about ``seconds`` each.
@@ -357,10 +357,9 @@ class TrainingLoop(abc.ABC):
 
     @property
     def is_finished(self) -> bool:
-        """Whether all steps or episodes are done, and all evaluations."""
+        """Whether all steps or episodes are done, and the last evaluation."""
         goals = (self.n_steps, self.steps), (self.n_episodes, self.episodes)
-        is_reached = any(goal is not None and n >= goal for n, goal in goals)
-        return is_reached and not self._lacks_evaluation
+        return not self._defers and any(goal is not None and n >= goal for n, goal in goals)
 
     def stop(self) -> None:
         """Stop after the present step, or before the first one of the next `run`."""
@@ -386,6 +385,7 @@ class TrainingLoop(abc.ABC):
             options=self._options(self.n_episodes),
             should_stop=lambda: self._stops,
         )
+        self._defers = evaluation is None
         if evaluation is None:
             return []
         self.evaluations.append((self.n_steps, evaluation.mean_return))
