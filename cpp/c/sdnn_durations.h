@@ -5,7 +5,7 @@
 
 #include "sdnn_real.h"
 
-/* A constant duration in usual steps, times 2^16: the compiler computes it. */
+/* A constant duration of up to 65,535 usual steps, times 2^16: the compiler computes it. */
 #define SDNN_DURATION(dt) ((uint32_t)((dt) * 65536.0 + 0.5))
 #define SDNN_USUAL_DURATION 65536
 #define SDNN_SHORTEST_DURATION 66 /* 0.001 usual steps */
@@ -70,7 +70,7 @@ static inline sdnn_factors sdnn_factors_of(uint32_t dt) {
   return factors;
 }
 
-/* Makes the present transition a usual one, and the one before one with this decay. */
+/* Makes the present transition a usual one, and sets the decay of the transition before it. */
 static inline void sdnn_set_durations(sdnn_durations* durations, uint16_t trace_decay) {
   durations->pending.discount = durations->pending.decay = 0;
   durations->trace_decay = trace_decay;

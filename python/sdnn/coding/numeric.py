@@ -245,9 +245,7 @@ class Anchored(Coding):
         # with the distance. Patterns on two sides of an anchor correlate by the product of their
         # shares of that anchor.
         n_stretches, n_bins = self.n_anchor_patterns - 1, self.n_interpolated + 1
-        stretch, number = np.divmod(
-            np.arange(self.size), n_bins
-        )  # of each bin, and its number in it
+        stretch, number = np.divmod(np.arange(self.size), n_bins)  # number: within the stretch
         share = number / n_bins  # share of the next anchor in the bin's pattern
         step = np.subtract.outer(stretch, stretch)
         within = 1 - np.abs(np.subtract.outer(share, share))

@@ -28,7 +28,7 @@ class FollowedRanges:
         last = np.clip(values[-WINDOW:], self.low, self.high)
         self.recent[: len(last)] = last
         self.n_noted = len(last)
-        self.now = self.low, self.high  # the range of the last samples, to be mapped to the learned
+        self.now = self.low, self.high  # of the last samples, which is mapped to the learned range
 
     def extend(self, ranges: Mapping[str, tuple[float, float]], last: pd.DataFrame) -> None:
         """Follow more features, whose ranges were learned from the last samples."""

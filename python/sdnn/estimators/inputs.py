@@ -46,14 +46,17 @@ DATES_HINT = "give numbers for it, such as the hour with coding=[(Circular(perio
 def refuse_dates(X: object) -> None:
     """Raise ValueError for a column of dates or times, which scikit-learn may take for numbers."""
     for name, column in columns_of_objects(X):
-        value = next((value for value in column if not is_missing(value)), None)
+        try:
+            value = next((value for value in column if not is_missing(value)), None)
+        except ValueError:  # a cell with an array, which scikit-learn refuses
+            return
         if isinstance(value, DATES) or hasattr(value, "to_timestamp"):  # pandas.Period
             raise ValueError(f"X has dates or times in column {name!r}: {DATES_HINT}")
 
 
 def columns_of_objects(X: Any) -> Iterator[tuple[object, Iterable[object]]]:
     """Yield the name and the values of each column whose type does not say that it has numbers."""
-    if hasattr(X, "iloc") and hasattr(X, "dtypes"):
+    if hasattr(X, "columns") and hasattr(X, "dtypes") and hasattr(X, "iloc"):  # pandas
         for index, (name, column_type) in enumerate(zip(X.columns, X.dtypes, strict=True)):
             if column_type.kind in "OmM":
                 yield name, X.iloc[:, index]
@@ -61,10 +64,19 @@ def columns_of_objects(X: Any) -> Iterator[tuple[object, Iterable[object]]]:
         for column in X.iter_columns():
             yield column.name, column
     else:
-        table = np.array(X, dtype=object) if isinstance(X, list | tuple) else X
+        try:
+            table = np.array(X, dtype=object) if isinstance(X, list | tuple) else X
+        except ValueError:  # parts of different sizes
+            return
         is_array = getattr(table, "ndim", 0) == 2 and hasattr(table, "dtype")
         if is_array and table.dtype.kind in "OmM":
             yield from enumerate(np.asarray(table).T)
+
+
+def with_names(x: Any) -> Any:
+    """Return a row of a data frame of pandas as a mapping, another sample unchanged."""
+    is_row = getattr(x, "ndim", 0) == 1 and hasattr(x, "index") and hasattr(x, "to_dict")
+    return x.to_dict() if is_row and all(isinstance(name, str) for name in x.index) else x
 
 
 def with_types_kept(X: object) -> object:
@@ -239,20 +251,29 @@ class CodedInputs(BaseEstimator):
         self._check_numbers(table, codings)
         return codings
 
-    def _fit_codings(self, codings: Sequence[Coding], table: Array, n_units: int) -> list[Coding]:
-        """Return the fitted coding of each input; ``ranges`` decides about outliers."""
+    def _fit_codings(
+        self,
+        codings: Sequence[Coding],
+        table: Array,
+        n_units: int,
+        names: Sequence[object] | None = None,
+    ) -> list[Coding]:
+        """Return the fitted coding of each column of a table; ``ranges`` decides about outliers.
+
+        Columns have the names of the features, or their numbers, unless others are given.
+        """
         fitted = []
-        for index, coding in enumerate(codings):
+        names = names or self._feature_names() or range(len(codings))
+        for index, (name, coding) in enumerate(zip(names, codings, strict=True)):
             column = table[:, index]
             numbers = numbers_to_range(coding, column)
             if numbers is not None and np.isfinite(numbers).any():
-                name = (self._feature_names() or range(len(codings)))[index]
                 low, high = self._range(f"column {name!r} of X", numbers[np.isfinite(numbers)])
                 column = column[~((numbers < low) | (numbers > high))]
             try:
                 fitted.append(coding.fit(column, n_units))
             except ValueError as error:
-                raise ValueError(f"{error} in column {index}") from None
+                raise ValueError(f"{error} in column {name!r}") from None
         return fitted
 
     def _range(self, name: str, values: Floats) -> tuple[float, float]:
@@ -289,8 +310,8 @@ class CodedInputs(BaseEstimator):
     def _row(self, x: Sample, code: InputCode) -> Array:
         """Return one sample, a row or a mapping from names, checked, shape (n_features,)."""
         codings = code.codings
-        if self._feature_names() and hasattr(x, "index") and hasattr(x, "to_dict"):
-            x = x.to_dict()  # a row of a data frame of pandas has names
+        if self._feature_names():
+            x = with_names(x)
         values = self._values_of(x, codings) if isinstance(x, Mapping) else x
         if code.is_numeric:
             try:
@@ -329,6 +350,7 @@ class CodedInputs(BaseEstimator):
 
     def _first_row(self, x: Sample) -> Array:
         """Return the first sample of a stream as a table; a mapping names the features."""
+        x = with_names(x)
         names = list(x) if isinstance(x, Mapping) else None
         row = np.array(list(x.values()) if isinstance(x, Mapping) else x, dtype=object)
         are_words = all(isinstance(name, str) for name in names or ())

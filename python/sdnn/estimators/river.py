@@ -151,7 +151,9 @@ class RiverClassifier(StreamEstimator, base.Classifier):
         return True
 
     def _check_target(self, y: object) -> None:
-        is_whole = isinstance(y, Integral | np.bool_) or (isinstance(y, Real) and y == y // 1)
+        is_whole = isinstance(y, Integral | np.bool_) or (
+            isinstance(y, Real) and float(y).is_integer()
+        )
         require(isinstance(y, str) or is_whole, "y", "be a word, a whole number or a bool", y)
         first = self.targets[0] if self.targets else y
         is_alike = isinstance(y, str) == isinstance(first, str)

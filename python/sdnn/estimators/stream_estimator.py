@@ -20,6 +20,7 @@ from sdnn.estimators.columns import Codings, Entry, Floats, coding_entries, codi
 from sdnn.estimators.experts import EXPERTS, Estimates, Experts
 from sdnn.estimators.followed_ranges import FollowedRanges
 from sdnn.estimators.growth import grow
+from sdnn.estimators.inputs import with_names
 from sdnn.estimators.network import COLUMN_BUDGET
 from sdnn.estimators.outliers import numbers_to_range
 from sdnn.estimators.regressor import SDNNRegressor
@@ -37,6 +38,7 @@ MOST_CATEGORIES = 1000  # later categories of a feature count as missing values
 
 def cleaned_sample(x: Features) -> Sample:
     """Return a sample with strings as names and None for missing values."""
+    x = with_names(x)
     require(isinstance(x, Mapping), "x", "be a dict of features", x, TypeError)
     sample = {str(name): value for name, value in x.items()}
     if len(sample) < len(x):
@@ -122,6 +124,7 @@ class StreamEstimator:
         self.samples: collections.deque[Sample] = collections.deque(maxlen=most)
         self.targets: collections.deque[Target] = collections.deque(maxlen=most)
         self.n_learned = 0
+        self.n_to_begin = self.grace_period  # `n_learned` at the next attempt to learn ranges
         self.n_before_additions: int | None = None  # `n_learned` at the first addition
         self.reads: dict[str, Callable[[object], object]] = {}  # converter of each feature's values
         self.categories: dict[str, set[object]] = {}  # learned categories by feature
@@ -150,11 +153,11 @@ class StreamEstimator:
         self.n_learned += 1
         if self.fitted is not None:
             self._learn_additions(sample)
-        elif len(self.samples) >= self.grace_period and (
-            len(set(self.targets)) >= self.least_targets
-        ):
+        elif self.n_learned >= self.n_to_begin and len(set(self.targets)) >= self.least_targets:
             try:
                 self._begin()
+                if self.fitted is None:  # no feature varies yet
+                    self.n_to_begin = self.n_learned + self.grace_period
             except BaseException:  # a setting of the model, or an interrupt
                 self.samples.pop()
                 self.targets.pop()
@@ -249,7 +252,8 @@ class StreamEstimator:
         # A twentieth of the samples is enough while there are few of them.
         fewest = min(FEWEST, max(1, len(self.samples) // 20))
         frequent = [name for name, count in counts.items() if count >= fewest]
-        frequent = [name for name in frequent if self._varies(name)]
+        if self._can_grow():
+            frequent = [name for name in frequent if self._varies(name)]
         names = sorted(frequent[:MOST_FEATURES])  # independent of the order in dictionaries
         if not names:
             return
@@ -297,10 +301,23 @@ class StreamEstimator:
             else:
                 self.ranges.extend(ranges, frame)
 
+    def _can_grow(self) -> bool:
+        """Return whether features may be learned later: the model has none by its number."""
+        has_names = isinstance(self.model.pairs, str)  # a list of pairs cannot name new features
+        for _, columns in coding_entries(self.model.coding):
+            listed = [columns] if isinstance(columns, str) else columns
+            is_every = not isinstance(self.model.coding, list | tuple)
+            are_words = isinstance(listed, list | tuple) and all(type(c) is str for c in listed)
+            has_names &= is_every or are_words
+        return has_names
+
     def _varies(self, name: str) -> bool:
         """Return whether a feature has a range to learn; one of words learns new words later."""
-        values = {sample.get(name) for sample in self.samples}
-        return len(values) > 1 or isinstance(next(iter(values)), str)
+        first, *others = (sample.get(name) for sample in self.samples)
+        return isinstance(first, str) or any(
+            (value is None) != (first is None) or (value is not None and value != first)
+            for value in others
+        )
 
     def _is_new(self, name: str, value: object) -> bool:
         """Return whether a feature, or a category of it, is not known."""
@@ -349,7 +366,7 @@ class StreamEstimator:
         )
         frequent = [addition for addition, count in counts.items() if count >= FEWEST]
         new: list[str] = []
-        if isinstance(self.model.pairs, str):  # a list of pairs cannot name new features
+        if isinstance(self.model.pairs, str):
             later = (name for name, _ in frequent if name not in self.reads)
             new = sorted(name for name in later if self._varies(name))
         changed: dict[int, Coding] = {}
@@ -369,7 +386,7 @@ class StreamEstimator:
         unfitted = self._codings([*names, *new], new)
         frame = self._frame()[new]
         n_units = self.fitted.network_.input_code.core.n_units
-        codings = self.fitted._fit_codings(unfitted, frame.to_numpy(dtype=object), n_units)
+        codings = self.fitted._fit_codings(unfitted, frame.to_numpy(dtype=object), n_units, new)
         added = dict(zip(new, codings, strict=True))
         if not grow(self.fitted, added, changed, self.most_columns):
             self._begin()

@@ -73,8 +73,8 @@ def c_header(
         episode. An `SDNNQLearning` needs ``averaging_interval=0``, ``weight_limit=127`` and
         actions of one dimension.
     durations : bool, optional
-        With ``learning``, also write ``NAME_learn_over``, which learns a transition of any duration
-        as ``Transition(..., dt=dt)`` does. Not for an `SDNNQLearning`.
+        With ``learning``, also write ``NAME_learn_over``, which learns a transition of up to
+        65,535 usual steps as ``Transition(..., dt=dt)`` does. Not for an `SDNNQLearning`.
 
     Raises
     ------

@@ -215,8 +215,7 @@ class Learner(Writer[Network]):
         """Return comment lines about memory.
 
         ``kilobytes`` of code are those without a history, running ranges or durations, of which 3
-        are for storing and keeping;
-        ``n_policy_words`` are the 32-bit words of the policy that is kept.
+        are for storing and keeping; ``n_policy_words`` are the 32-bit words of the kept policy.
         """
         kilobytes += 3 * self.history.is_needed
         kilobytes += 2 * (self.history.follows_ranges + self.has_durations)

@@ -113,6 +113,7 @@ class PaperStudy(Study):
                 f"agents whose cost is measured are {', '.join(measured)},"
                 f" got {', '.join(self.agents)}"
             )
+        # Names of files have a mark for each setting that is not the default.
         self._marks = [
             *self.agents,
             *(["with"] if self.agents and presets else []),  # else "rbf-robust" is a preset
@@ -122,7 +123,7 @@ class PaperStudy(Study):
             *([f"{episodes}-episodes"] if episodes != defaults[1] else []),
             *([f"seed-{seed}"] if seed else []),
             *(["quick"] if quick else []),
-        ]  # of what is not the default, in the names of files
+        ]
 
     def measure(self, store: ResultStore, observe: Observer) -> None:
         """Measure the costs that are not stored."""

@@ -122,9 +122,8 @@ class RunSpec(Settings, frozen=True):
             self._set(**{name: base if is_preset else with_changes(base, value, name, hint)})
         agent, is_scaled = self.agent, self.environment.changes_observations
         followed = {
-            "angle_pairs": "none"
-            if is_scaled
-            else defaults.angle_pairs,  # scaled values are on no circle
+            # Scaled values are on no circle.
+            "angle_pairs": "none" if is_scaled else defaults.angle_pairs,
             "inputs": defaults.inputs,
             "history": "none" if agent.missing == "code" else defaults.history,
         }

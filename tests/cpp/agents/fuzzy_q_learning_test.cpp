@@ -197,7 +197,7 @@ TEST(FuzzyQLearning, EnvironmentsHaveSeparateLastActionsAndTraces) {
     for (const std::size_t e : {0U, 1U}) {
       State next = {random.uniform() / 3.0, random.uniform() / 3.0};
       if (e == 1) next = {1.0 - next[0], 1.0 - next[1]};
-      const double reward = random.uniform();
+      const double size = random.uniform(), reward = e == 1 ? -size : size;
       const bool terminated = i % n_steps[e] == n_steps[e] - 1;
       both.learn(states[e], actions[e], reward, next, terminated, e);
       alone[e].learn(states[e], actions[e], reward, next, terminated);

@@ -192,7 +192,7 @@ def test_wrong_names_of_a_table_are_reported_in_their_line(tmp_path, names):
 
 def test_rows_of_json_without_next_observations_follow_each_other(tmp_path):
     agents = [new_agent(history="none", observation_range=(-1, 1)) for _ in range(2)]
-    path = lines(tmp_path / "log.jsonl")
+    path = write_log(tmp_path / "log.jsonl")
     log = [json.loads(line) for line in path.read_text().splitlines()[:30]]
     rows = [{n: v for n, v in row.items() if n != "next_observation"} for row in log]
     path.write_text("".join(json.dumps(row) + "\n" for row in rows))
@@ -217,7 +217,7 @@ def test_a_log_that_does_not_end_the_warm_up_is_warned_of():
 
 
 class RandomPlaces(gym.Env):
-    observation_space, action_space = PLACE, BUTTONS
+    observation_space, action_space = PLANE, THREE_ACTIONS
 
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)

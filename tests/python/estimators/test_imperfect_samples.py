@@ -9,10 +9,12 @@ import pytest
 
 from refusals import refuses
 from sdnn import SDNNClassifier, SDNNKernelRidge, SDNNRegressor
+from sdnn.coding import RandomInverse
 
 RANDOM = np.random.RandomState(0)
 X = RANDOM.uniform(size=(600, 2))
 SMALL = {"n_pattern_units": 40, "random_state": 0}
+UNIT = RandomInverse(low=0.0, high=1.0)
 DAY = datetime.date(2026, 11, 29)
 
 
@@ -43,11 +45,30 @@ def test_a_feature_that_is_constant_at_first_is_learned_once_it_varies(river, ex
     assert mean_error(model, samples, flag + 0.1 * X[:, 1]) < 0.1
 
 
-def test_a_stream_of_constant_features_predicts_the_mean(river):
+def test_a_stream_of_constant_features_predicts_the_mean_until_one_varies(river):
     model = river.RiverRegressor()
     for y in range(150):
         model.learn_one({"a": 1.0, "b": None}, y)
     assert model.predict_one({"a": 1.0}) == np.mean(range(150))
+    for y in range(100):  # the next attempt to learn ranges is at 200 samples
+        model.learn_one({"a": y / 100, "b": None}, y)
+    assert list(model.reads) == ["a"]
+
+
+@pytest.mark.parametrize("options", [{"pairs": [(0, 1)]}, {"coding": [("anchor", [1])]}])
+def test_features_that_a_model_names_by_their_numbers_are_learned_while_constant(river, options):
+    model = river.RiverRegressor(SDNNRegressor(**SMALL, **options), grace_period=20)
+    for a, y in X[:40].tolist():
+        model.learn_one({"a": 1.0, "b": a, "c": -a}, y)
+    assert list(model.reads) == ["a", "b", "c"]
+
+
+def test_more_features_may_come_at_once_than_there_were(river):
+    model = river.RiverRegressor(SDNNRegressor(**SMALL), grace_period=20)
+    for i, (a, y) in enumerate(X[:300].tolist()):
+        late = {"b": y, "c": -y, "d": a * y} if i >= 30 else {}
+        model.learn_one({"a": a, **late}, y)
+    assert list(model.reads) == ["a", "b", "c", "d"]
 
 
 @pytest.mark.parametrize("word", ["?", "n/a"])
@@ -91,6 +112,17 @@ def test_rows_of_frames_are_read_by_their_names():
     row = frame.iloc[0]
     assert model.predict_one(row[["b", "a"]]) == model.predict(frame[:1])[0]
     refuses("other", model.predict_one, row.rename({"a": "other"}))
+    assert model.predict_one(row.reset_index(drop=True)) == model.predict_one(row)
+    first = SDNNRegressor(**SMALL, coding=UNIT, output_range=(0.0, 1.0)).learn_one(row, 0.5)
+    assert first.feature_names_in_.tolist() == ["a", "b"]
+    refuses("DataFrame", SDNNRegressor().fit, row, [0.5])
+
+
+def test_tables_with_arrays_in_cells_are_refused():
+    cells = [[np.zeros(2), 1.0], [np.zeros(3), 2.0]]
+    for samples in (cells, pd.DataFrame({"a": [np.zeros(2), np.zeros(3)], "b": [1.0, 2.0]})):
+        with pytest.raises(ValueError, match="sequence"):
+            SDNNRegressor().fit(samples, [0.0, 1.0])
 
 
 MISSING_TARGETS = {

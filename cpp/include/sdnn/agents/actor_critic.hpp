@@ -341,7 +341,8 @@ class ActorCritic : public IndexAgent<ActorCritic> {
                   .rate = actor_rate_,
                   .entropy = static_cast<std::int32_t>(std::lround(config_.entropy * kOne)),
                   .decay = td_.decay(episode)},
-                 next_code);
+                 // Another environment learns before the preferences of s' are read.
+                 n_environments() == 1 ? next_code : nullptr);
     td_.correct(episode, episodes_, kOnlyAction, error, rate_, is_dutch);
   }
 
