@@ -303,7 +303,7 @@ def test_returns_of_imitated_episodes_are_discounted_by_durations():
 
 @pytest.mark.parametrize("dt", BAD_DURATIONS)
 @pytest.mark.parametrize("agent_class", AGENTS)
-def test_impossible_durations_of_transitions_logs_and_environments_are_refused(agent_class, dt):
+def test_impossible_durations_are_refused_and_change_nothing(agent_class, dt):
     agent, courier = agent_and_courier(agent_class)
     action = agent.act([0.5])
     before = agent.state()
