@@ -14,7 +14,6 @@ from stopped_training import states_equal
 
 N_INPUTS = 3
 OBSERVATIONS = gym.spaces.Box(0.0, 1.0, (N_INPUTS,), np.float64)
-READ_OBSERVATIONS = np.random.default_rng(0).random((60, N_INPUTS))
 ONE_ACTION = gym.spaces.Box(-1.0, 1.0, (1,), np.float64)
 TWO_ACTIONS = gym.spaces.Box(-1.0, 1.0, (2,), np.float64)
 SIZES = SDNNCConfig(n_pattern_units=50, n_hidden_units=200, n_active_units=60, n_actions=9)
@@ -42,13 +41,18 @@ def train(agent, n_steps, seed):
         observation = next_observation
 
 
+def observations_to_read():
+    """Draw 60 observations anew, in which time a learner that waits for readers gets its turn."""
+    return np.random.default_rng(0).random((60, N_INPUTS))
+
+
 def read_values(agent):
     values_of = agent.value if isinstance(agent, FuzzyQLearning) else agent.q_values
-    return np.array([values_of(observation) for observation in READ_OBSERVATIONS])
+    return np.array([values_of(observation) for observation in observations_to_read()])
 
 
 def read_greedy_actions(agent):
-    return np.array([agent.act(observation, explore=False) for observation in READ_OBSERVATIONS])
+    return np.array([agent.act(row, explore=False) for row in observations_to_read()])
 
 
 def run_in_threads(*functions):
