@@ -565,7 +565,11 @@ def _loop_cell(kind, name, function, parameters, parameter, value):
         reused = ReusedAgent(kind)
         agent = reused.agent
         good = arguments(agent, parameters)
-        training = Training(agent, Slope(agent.action_space), steps=5, seed=3)
+        env, other_env = (Slope(agent.action_space) for _ in range(2))
+        evaluations = {"evaluate_every": 5, "evaluation_env": other_env, "evaluation_episodes": 1}
+        if name != "StopTrainingOnRewardThreshold":  # which compares evaluations
+            evaluations = {}
+        training = Training(agent, env, steps=5, seed=3, **evaluations)
         if name == "evaluate":
             good["episodes"] = 2
         if name.startswith("Training."):
