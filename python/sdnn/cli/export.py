@@ -328,8 +328,8 @@ def _new_agent(
     if is_running and kind != "actor-critic":
         raise click.UsageError("--range running needs --agent actor-critic: state LOW:HIGH")
     more: dict[str, Any] = {"observation_range": "running"} if is_running else {}
-    words = {"angle": (-math.pi, math.pi), "running": (-1.0, 1.0)}
-    bounds = [words[text] if text in words else _bounds_in("--range", text) for text in ranges]
+    bounds_by_name = {"angle": (-math.pi, math.pi), "running": (-1.0, 1.0)}
+    bounds = [bounds_by_name.get(text) or _bounds_in("--range", text) for text in ranges]
     tables: dict[str, dict[str, object]] = {"approximator": {}, "learning": {}}
     for name, text in named_values("--set", settings):
         table, _, key = name.partition(".")

@@ -70,7 +70,7 @@ ATTRIBUTES: dict[str, type] = {
     "held_out_residuals_": np.ndarray,
     "steepness_": float,
 }
-"""Types of the attributes of `Learned` as a file has them; NumPy's names in annotations change."""
+"""Types of the attributes of `Learned` in a file; what annotations hold depends on NumPy."""
 
 
 class Fitted(Learned):

@@ -158,7 +158,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         outputs = self.predict(X)  # first, since it raises if the model is not fitted
         if not hasattr(self, "held_out_residuals_"):
             raise AttributeError(
-                "predict_interval needs a fit with calibrate=True as the last learning"
+                "predict_interval needs a fit with calibrate=True, and nothing learned after it"
             )
         widths = error_bounds(np.abs(self.held_out_residuals_), self.held_out_counts_, share)
         width: Array = widths[0] if self._flat else widths

@@ -303,21 +303,20 @@ class StreamEstimator:
 
     def _can_grow(self) -> bool:
         """Return whether features may be learned later: the model has none by its number."""
-        has_names = isinstance(self.model.pairs, str)  # a list of pairs cannot name new features
-        for _, columns in coding_entries(self.model.coding):
-            listed = [columns] if isinstance(columns, str) else columns
-            is_every = not isinstance(self.model.coding, list | tuple)
-            are_words = isinstance(listed, list | tuple) and all(type(c) is str for c in listed)
-            has_names &= is_every or are_words
-        return has_names
+        if not isinstance(self.model.pairs, str):  # a list of pairs cannot name new features
+            return False
+        if not isinstance(self.model.coding, list | tuple):
+            return True
+        return all(
+            isinstance(columns, str)
+            or (isinstance(columns, list | tuple) and all(type(c) is str for c in columns))
+            for _, columns in coding_entries(self.model.coding)
+        )
 
     def _varies(self, name: str) -> bool:
         """Return whether a feature has a range to learn; one of words learns new words later."""
         first, *others = (sample.get(name) for sample in self.samples)
-        return isinstance(first, str) or any(
-            (value is None) != (first is None) or (value is not None and value != first)
-            for value in others
-        )
+        return isinstance(first, str) or any(value != first for value in others)
 
     def _is_new(self, name: str, value: object) -> bool:
         """Return whether a feature, or a category of it, is not known."""

@@ -198,9 +198,9 @@ def test_a_training_prints_the_history_unless_its_option_is_none(invoke, tmp_pat
         return invoke("train", "CartPole-v1", *options).output.splitlines()
 
     assert not any(line.startswith("history") for line in printed_lines("--history", "none"))
-    found = "history of observations in states: none, as the warm-up found"
-    assert found in printed_lines("--history", "auto")
-    assert found in printed_lines("--seed", "1"), "auto is the default"
+    line = "history of observations in states: none, as the warm-up found"
+    assert line in printed_lines("--history", "auto")
+    assert line in printed_lines("--seed", "1"), "auto is the default"
     averages = printed_lines("--history", "averages")
     assert "history of observations in states: averages" in averages
 

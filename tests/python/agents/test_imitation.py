@@ -169,16 +169,16 @@ def imitate_in_numpy(slow, x, action, value, margin):
     move_in_numpy(slow, x, np.full(len(slow.weights), error), rate, action)
     errors = np.zeros(len(slow.weights), np.int64)
     for dimension, values in enumerate(slow.sums(x, slow.weights)):
-        taken = action[dimension]
-        others = np.delete(np.arange(len(values)), taken)
+        chosen = action[dimension]
+        others = np.delete(np.arange(len(values)), chosen)
         if len(others) == 0:
             continue
         best = others[np.argmax(values[others])]
-        error = int(values[best]) + slow.units_of(margin) - int(values[taken])
+        error = int(values[best]) + slow.units_of(margin) - int(values[chosen])
         if error > 0:
             half = error * len(action) // 2
             rows = slow.first_rows[dimension] + np.arange(slow.window)
-            np.add.at(errors, rows + taken, half)
+            np.add.at(errors, rows + chosen, half)
             np.add.at(errors, rows + best, -half)
     move_in_numpy(slow, x, errors, 2**16 // 10, action)  # a rate of 0.1 in units of 2^-16
 

@@ -662,8 +662,8 @@ def _file_cell(description, arrays, kind):
             except OverflowError:
                 continue  # values as large as can be were in the file
             except ValueError as error:
-                words = (str(path), "env must", "repeat_episodes must")  # refused by their names
-                fault = "" if any(word in str(error) for word in words) else str(error)
+                named = (str(path), "env must", "repeat_episodes must")
+                fault = "" if any(name in str(error) for name in named) else str(error)
             if fault:
                 return fault
         return ""

@@ -235,10 +235,10 @@ def rows_in_c(model, X):
     X = np.array(X, object)
     for index, coding in enumerate(model.codings_):
         base = coding.base if isinstance(coding, WithMissing) else coding
-        words = list(getattr(base, "categories", None) or ())
-        if any(isinstance(word, str) for word in words):
-            numbers = {word: number for number, word in enumerate(words)} | {None: np.nan}
-            X[:, index] = [numbers.get(word, len(words)) for word in X[:, index]]
+        categories = list(getattr(base, "categories", None) or ())
+        if any(isinstance(category, str) for category in categories):
+            numbers = {word: number for number, word in enumerate(categories)} | {None: np.nan}
+            X[:, index] = [numbers.get(word, len(categories)) for word in X[:, index]]
     return X.astype(np.float64)
 
 
