@@ -19,6 +19,7 @@ from sdnn.estimators.columns import Array, Floats, Ints
 from sdnn.estimators.fitted import Fitted
 from sdnn.estimators.network import Network
 from sdnn.support.arguments import require
+from sdnn.support.progress import ProgressBars
 
 LARGE_SAMPLE = 5000
 """Size from which on every epoch's network is averaged, and blocks of samples are shuffled."""
@@ -49,17 +50,20 @@ class History:
 
 
 @contextmanager
-def progress_bar(verbose: int, n_epochs: int) -> Iterator[Callable[[int], None]]:
-    """Yield a function to call after each epoch with the number of corrected samples."""
-    if not verbose:
-        yield lambda n_corrected: None
-        return
-    from rich.progress import MofNCompleteColumn, Progress
+def progress_bar(verbose: int, n_epochs: int) -> Iterator[Callable[[int, int], None]]:
+    """Show a bar on standard output if `verbose`.
 
-    with Progress(*Progress.get_default_columns(), MofNCompleteColumn()) as progress:
-        task = progress.add_task("training", total=n_epochs)
-        yield lambda n_corrected: progress.update(
-            task, advance=1, description=f"training, {n_corrected} corrected"
+    Yield a function to call after each epoch, with the number of epochs and of corrected samples.
+    """
+    if not verbose:
+        yield lambda epochs, n_corrected: None
+        return
+    from rich.console import Console
+
+    with ProgressBars(Console(), remain=True) as bars:
+        bars.add("epochs", "training", n_epochs)
+        yield lambda epochs, n_corrected: bars.update(
+            "epochs", epochs, news=f"{epochs}/{n_epochs}, {n_corrected} corrected"
         )
 
 
@@ -245,14 +249,14 @@ def run_epochs(
     # Training ends after so many epochs without a correction that each sample was presented.
     n_uncorrected, most_uncorrected = 0, epochs_to_present_all(weights)
     earlier: deque[Network] = deque(maxlen=n_averaged_epochs - 1)
-    with progress_bar(model.verbose, max_iter) as advance:
+    with progress_bar(model.verbose, max_iter) as show:
         for epoch in range(max_iter):
             order = samples_of_epoch(n_samples, weights, epoch)
             if model.shuffle:
                 order = shuffled(order, random, in_blocks)
             n_corrected, _ = trainer.present(order)
             history.n_corrected.append(n_corrected)
-            advance(n_corrected)
+            show(epoch + 1, n_corrected)
             if score is not None:
                 trainer.synchronize()
                 history.scores.append(score())

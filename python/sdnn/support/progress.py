@@ -11,24 +11,25 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import TaskID
 
-_SPEED_SECONDS = 60.0  # time over which the speed is averaged for the time left
-_NOTEBOOK_SECONDS = 0.25  # time between two changes of a notebook's output
+_SPEED_SECONDS = 60.0  # time over which the speed is averaged for the time left; chosen
+_NOTEBOOK_SECONDS = 0.25  # least time between two changes of a notebook's output; chosen
 
 
 class ProgressBars:
-    """Shows a bar for each task on a terminal or in a notebook, and nothing elsewhere.
+    """Bars of tasks on a terminal or in a notebook, shown within a ``with`` block.
 
-    A context manager. By default bars are on standard error.
+    By default they are on standard error, and vanish from a terminal at the end. With ``remain``
+    they stay there, and a file or pipe receives their last state, which it does not by default.
     """
 
-    def __init__(self, console: Console | None = None) -> None:
+    def __init__(self, console: Console | None = None, *, remain: bool = False) -> None:
         from rich import progress
         from rich.console import Console
 
         console = Console(stderr=True) if console is None else console
         self._is_notebook = console.is_jupyter
-        self._output: Any = None  # the notebook's output: rich would need ipywidgets
-        self._due = 0.0
+        self._output: Any = None  # a notebook's output: rich itself would need ipywidgets there
+        self._due = 0.0  # monotonic time before which a notebook's output stays as it is
         self._progress = progress.Progress(
             progress.TextColumn("{task.description}"),
             progress.BarColumn(),
@@ -36,8 +37,8 @@ class ProgressBars:
             progress.TextColumn("{task.fields[news]}"),
             progress.TimeRemainingColumn(compact=True),
             console=console,
-            transient=True,
-            disable=not console.is_terminal or self._is_notebook,
+            transient=not remain,
+            disable=self._is_notebook or not (remain or console.is_terminal),
             speed_estimate_period=_SPEED_SECONDS,
         )
         self._tasks: dict[Hashable, TaskID] = {}
@@ -55,7 +56,7 @@ class ProgressBars:
         self._draw()
 
     def _draw(self) -> None:
-        """Update the output of a notebook, at most every quarter of a second."""
+        """Update the output of a notebook, unless the last change is too recent."""
         now = time.monotonic()
         if not self._is_notebook or now < self._due:
             return
@@ -67,12 +68,15 @@ class ProgressBars:
             self._output.update(self._progress, include=["text/html"])
 
     def add(self, key: Hashable, title: str, total: int | None) -> None:
-        """Open the bar of a task, unless it is open."""
+        """Open the bar of a task, unless it is open; ``total`` None: its length is not known."""
         if key not in self._tasks:
             self._tasks[key] = self._progress.add_task(title, total=total, news="")
 
     def update(self, key: Hashable, done: int, **fields: Any) -> None:
-        """Move a bar; ``description`` changes its title, ``news`` the text after it."""
+        """Move a task's bar to ``done`` of its total; without a bar nothing happens.
+
+        ``description`` changes its title, ``news`` the text after it.
+        """
         if key in self._tasks:
             self._progress.update(self._tasks[key], completed=done, **fields)
             self._draw()

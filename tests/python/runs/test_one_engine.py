@@ -55,9 +55,7 @@ def test_only_the_store_imports_sqlite():
 
 
 def test_only_one_module_draws_progress_bars():
-    importing = modules_with(imports("rich.progress"))
-    # Estimators draw the bars of their setting `verbose` themselves, in notebooks and logs, too.
-    assert importing - {"estimators/training"} == {"support/progress"}
+    assert modules_with(imports("rich.progress")) == {"support/progress"}
 
 
 def test_each_agent_class_has_one_registered_id():
