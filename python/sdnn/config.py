@@ -26,20 +26,20 @@ from sdnn.support.arguments import explains_names
 
 
 class Field(NamedTuple):
-    """A setting of the core."""
+    """A setting of the core, in the order in which C++ describes it (bind_config.hpp)."""
 
     name: str
-    hint: str
+    hint: str  # its type as Python source, such as "float | None"
     default: Any
     doc: str
-    low: float
-    high: float
-    excludes_low: bool
+    low: float  # smallest value, -inf without a limit
+    high: float  # largest value, inf without a limit
+    excludes_low: bool  # whether values must be above `low`
 
     @property
     def type(self) -> Any:
         """The type of the setting's values."""
-        return eval(self.hint, {"typing": typing})
+        return eval(self.hint, {"typing": typing})  # the text is one of the core's, not a user's
 
 
 def fields_of(config_class: object) -> tuple[Field, ...]:
@@ -57,7 +57,11 @@ def values_of(config: object) -> dict[str, object]:
 
 
 def _make_dataclass(config_class: Any) -> None:
-    """Add the attributes to a class of the core that functions of `dataclasses` need."""
+    """Add the attributes to a class of the core that functions of `dataclasses` need.
+
+    So `dataclasses.replace`, ``help`` and editors know its settings. They are taken from a
+    dataclass with the same fields, which is then dropped.
+    """
     fields = [
         (field.name, field.type, dataclasses.field(default=field.default))
         for field in fields_of(config_class)
@@ -71,8 +75,9 @@ def _make_dataclass(config_class: Any) -> None:
     explains_names()(config_class)
 
 
-(WARM_UP,) = fields_of(Controller)
+(WARM_UP,) = fields_of(Controller)  # the only setting of a controller itself
 """The number of steps of a warm-up, which agents and specifications share."""
 
+# A list, since the loop's own variable is added to the names while they are read.
 for _config_class in [value for name, value in vars().items() if name.endswith("Config")]:
     _make_dataclass(_config_class)

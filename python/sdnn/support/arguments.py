@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Member = TypeVar("Member")
 Called = TypeVar("Called", bound=Callable[..., Any])
 
-_REPR = reprlib.Repr()
+_REPR = reprlib.Repr()  # its limits, in characters and items, are chosen
 _REPR.maxstring = _REPR.maxother = _REPR.maxlong = 200
 _REPR.maxlist = _REPR.maxtuple = _REPR.maxdict = 12
 
@@ -179,13 +179,16 @@ def single_number(value: object) -> object:
 
 
 def reward_of(reward: object) -> float:
-    """Convert a reward, a number, bool or array with a single number; ValueError for others."""
+    """Convert a reward, a number, bool or array with a single number; ValueError for others.
+
+    Numbers of other libraries, such as tensors, are accepted, too: they convert themselves.
+    """
     if isinstance(reward, float):  # includes np.float64
         return float(reward)
     import numpy as np
 
     reward = single_number(reward)
-    is_of_numpy = isinstance(reward, np.ndarray | np.generic)
+    is_of_numpy = isinstance(reward, np.ndarray | np.generic)  # of several numbers, or none
     if isinstance(reward, SupportsFloat) and not is_of_numpy:
         with suppress(OverflowError, TypeError, ValueError):
             return float(reward)
@@ -198,9 +201,10 @@ def duration_of(dt: object) -> float:
 
 
 def _small_enough(name: str, value: object) -> float:
-    """Check a number; ValueError if not, also for one beyond all floats.
+    """Return a number as a float; ValueError for other values and numbers beyond all floats.
 
-    Callers of `Agent.learn` would take an OverflowError for that of a weight.
+    `real` has an OverflowError for the latter, which callers of `Agent.learn` would take for that
+    of a weight.
     """
     try:
         return real(name, value)
@@ -289,8 +293,8 @@ def _error_of_call(
     elsewhere: Mapping[str, str],
 ) -> Exception | None:  # fmt: skip
     """Return the error that explains why arguments do not fit a function; None if they fit."""
-    is_made = called.__name__ == "__init__"
-    who = type(arguments[0]).__name__ if is_made else called.__name__
+    is_constructor = called.__name__ == "__init__"
+    title = type(arguments[0]).__name__ if is_constructor else called.__name__
     try:
         signature = inspect.signature(called)
     except ValueError:  # in the core, a class has the signature, not its `__init__`
@@ -299,13 +303,14 @@ def _error_of_call(
     parameters = signature.parameters.values()
     names = [p.name for p in parameters if p.kind is not inspect.Parameter.VAR_KEYWORD]
     possible = [name for name in names if name not in ("self", "cls")]
-    if len(names) == len(parameters):
+    accepts_any_name = len(names) < len(parameters)  # it has **kwargs
+    if not accepts_any_name:
         for name in options:
             if name not in names:
-                problem = f"is no argument of {who}: {advice(name, possible, elsewhere)}"
+                problem = f"is no argument of {title}: {advice(name, possible, elsewhere)}"
                 return argument_error(name, problem, TypeError)
     try:
         signature.bind(*arguments, **options)
     except TypeError as error:
-        return TypeError(f"{who}: {error}; possible: {', '.join(possible)}")
+        return TypeError(f"{title}: {error}; possible: {', '.join(possible)}")
     return None

@@ -10,11 +10,11 @@ from functools import lru_cache
 from io import StringIO
 from itertools import chain
 
-_PIECE_CHARACTERS = 2**20
+_PIECE_CHARACTERS = 2**20  # least length of a piece but the last; chosen
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """First characters of cells that a spreadsheet runs, unless they are numbers."""
 _NUMBER = re.compile(r"[+-]?\.?\d[\d.]*(e[+-]?\d+)?")
-_GZIP = 31  # zlib's `wbits` for a window of 2**15 bytes and gzip's header
+_GZIP = 16 + 15  # zlib's `wbits` for gzip's header and a window of 2**15 bytes, the largest
 
 
 def csv_bytes(header: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
@@ -38,14 +38,18 @@ def csv_pieces(header: Sequence[str], rows: Iterable[Sequence[object]]) -> Itera
     yield text.getvalue().encode()
 
 
-@lru_cache
+@lru_cache  # most texts of a table are repeated in many rows
 def _escape_formula(text: str) -> str:
+    """Return the text of a cell, with an apostrophe before it if a spreadsheet would run it."""
     is_formula = text.startswith(_FORMULA) and not _NUMBER.fullmatch(text)
     return f"'{text}" if is_formula else text
 
 
 def gzip_pieces(pieces: Iterable[bytes]) -> Iterator[bytes]:
-    """Compress pieces as gzip does, quickly; equal pieces give equal bytes at any time."""
+    """Compress pieces as gzip does, quickly; equal content gives equal bytes at any time.
+
+    The header has no date, unlike that of `gzip.compress` by default.
+    """
     compressor = zlib.compressobj(level=1, wbits=_GZIP)
     for piece in pieces:
         yield compressor.compress(piece)

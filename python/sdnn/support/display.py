@@ -43,18 +43,23 @@ class Displayed:
 
 
 def curve_svg(values: Sequence[float], *, n_points: int = 80) -> str:
-    """Return a small curve as SVG, of the means of equal parts; empty for fewer than two values.
+    """Return a small curve as SVG, for notebooks.
+
+    Its points are means: values are cut into at most ``n_points`` parts of nearly equal length. The
+    text is empty for fewer than two values, and if a mean is not finite.
 
     >>> curve_svg([5.0])
     ''
     """
     n = min(len(values), n_points)
-    limits = [len(values) * i // n for i in range(n + 1)] if n else []
+    if n < 2:
+        return ""
+    limits = [len(values) * i // n for i in range(n + 1)]
     means = [sum(values[i:j]) / (j - i) for i, j in pairwise(limits)]
-    if n < 2 or not all(map(math.isfinite, means)):
+    if not all(map(math.isfinite, means)):
         return ""
     low, high = min(means), max(means)
-    extent = (high - low) or 1.0
+    extent = (high - low) or 1.0  # a constant curve is a line at the bottom
     points = " ".join(
         f"{2 + _WIDTH * i / (n - 1):.1f},{2 + _HEIGHT * (1 - (mean - low) / extent):.1f}"
         for i, mean in enumerate(means)

@@ -30,15 +30,18 @@ from sdnn._core import __version__
 PARTIAL_SUFFIX = ".partial"  # suffix of a file that is being written
 _NAME_OF_PARTIAL = re.compile(r"\.[0-9a-f]{16}\.partial$")
 _ABANDONED_SECONDS = 60
-"""Age of a partial file that counts as abandoned, on file systems without locks."""
+"""Age of a partial file that counts as abandoned, on file systems without locks; chosen."""
 
 _FOLDERS_OF_DEVICES = tuple(map(Path, ("/dev", "/dev/fd", "/proc/self/fd")))
 """Names in these folders, such as ``/dev/stdout``, are written to and never replaced."""
 
 FORMAT = 1
-MAX_BYTES = 2**34
+MAX_BYTES = 2**34  # largest file of an agent, as in core/safetensors.hpp
 MOST_EMPTY_ARRAYS = 1024
-"""Number of arrays that a file may have in addition to one per two bytes of content."""
+"""Number of arrays that a file may have in addition to one per two bytes of content.
+
+It is a chosen limit, the same as in core/safetensors.hpp.
+"""
 
 _LENGTH_BYTES = 8
 _BEGINNING = b'{"__metadata__":{"sdnn":"{\\"checksum\\":\\"'
@@ -119,6 +122,7 @@ def open_regular(path: Path, max_bytes: int) -> BinaryIO:
 
 
 def _open_at_once(name: str, flags: int) -> int:
+    """Open a file, perhaps the target of a link; never wait for the writer of a pipe."""
     return os.open(name, flags | _NO_WAITING)
 
 
@@ -206,11 +210,14 @@ def remove_abandoned_files(folder: Path) -> None:
             continue
         with suppress(OSError):  # another process may have removed or renamed it
             with open(path, "rb+", opener=_open_itself) as file:
-                is_abandoned = lock(file.fileno())
-                if is_abandoned and os.name != "nt":  # Windows cannot remove an open file
+                is_locked = lock(file.fileno())
+                if is_locked is False:  # its writer is alive
+                    continue
+                if is_locked and os.name != "nt":
                     path.unlink()
-            age = 0.0 if is_abandoned is False else time.time() - path.stat().st_mtime
-            if age > _ABANDONED_SECONDS:
+                    continue
+            # Windows cannot remove an open file, and files without locks show their age only.
+            if time.time() - path.stat().st_mtime > _ABANDONED_SECONDS:
                 path.unlink()
 
 
@@ -243,19 +250,13 @@ def write_file(
 def read_file(path: Path, *contents: str) -> tuple[Description, Arrays]:
     """Read the description and the arrays of a file whose content is one of ``contents``.
 
-    OSError if it cannot be opened or is not a regular file; ValueError if it is damaged, of
-    another program, or has another content or format.
+    These are kinds as of `write_file`. OSError if the file cannot be opened or is not a regular
+    file; ValueError if it is damaged, of another program, or has another content or format.
     """
     from safetensors import SafetensorError
     from safetensors.numpy import load
 
-    with open_regular(path, MAX_BYTES) as file:
-        if file.read(_CHECKSUM.start)[_LENGTH_BYTES:] != _BEGINNING:
-            raise ValueError(f"{path} is not a file of sdnn, or is damaged")
-        file.seek(0)
-        data = file.read(os.fstat(file.fileno()).st_size)
-    if data[_CHECKSUM] != _checksum(memoryview(data)):
-        raise ValueError(f"{path} is damaged: its checksum does not fit its content")
+    data = _intact_bytes(path)
     end = _LENGTH_BYTES + int.from_bytes(data[:_LENGTH_BYTES], "little")
     # A header that lists far more arrays than the content can hold would take long to read.
     n_arrays, n_bytes = data.count(b'"dtype"', _LENGTH_BYTES, end), max(len(data) - end, 0)
@@ -284,6 +285,18 @@ def read_file(path: Path, *contents: str) -> tuple[Description, Arrays]:
         return description, load(data)
     except (LookupError, SafetensorError, ValueError) as error:
         raise ValueError(f"{path} is damaged: {error}") from None
+
+
+def _intact_bytes(path: Path) -> bytes:
+    """Read a file of this format; ValueError if its beginning or its checksum does not fit."""
+    with open_regular(path, MAX_BYTES) as file:
+        if file.read(_CHECKSUM.start)[_LENGTH_BYTES:] != _BEGINNING:
+            raise ValueError(f"{path} is not a file of sdnn, or is damaged")
+        file.seek(0)
+        data = file.read(os.fstat(file.fileno()).st_size)
+    if data[_CHECKSUM] != _checksum(memoryview(data)):
+        raise ValueError(f"{path} is damaged: its checksum does not fit its content")
+    return data
 
 
 def _checksum(data: memoryview) -> bytes:

@@ -12,7 +12,7 @@ from types import MappingProxyType
 _NO_BATCHES = "each transition or sample is learned by itself: omit it"
 _NO_GRADIENT = "there is no gradient descent: omit it"
 _NO_POLICY = "there is no policy network: approximator and learning hold the settings"
-_FIRST = (
+_ENVIRONMENT_ELSEWHERE = (
     "an agent keeps no environment: SDNNQLambda(env), train(env, steps=...) and"
     " evaluate(agent, env) take it"
 )
@@ -52,7 +52,8 @@ _MEANINGS: Mapping[tuple[str, ...], tuple[str, ...]] = {
     ("n_envs", "num_envs", "make_vec_env", "DummyVecEnv", "SubprocVecEnv", "VecEnv"): (
         "n_envs", "n_environments",
         "train takes a vector environment: gymnasium.make_vec(id, num_envs=...)"),
-    ("env", "env_id", "gym_id", "environment", "get_env", "set_env"): ("environment", _FIRST),
+    ("env", "env_id", "gym_id", "environment", "get_env", "set_env"): (
+        "environment", _ENVIRONMENT_ELSEWHERE),
     ("algo", "algorithm", "model"): ("agent", "name"),
     ("obs",): ("observation",),
     ("deterministic",): ("act(observation, explore=False) acts greedily",),
@@ -105,9 +106,11 @@ _MEANINGS: Mapping[tuple[str, ...], tuple[str, ...]] = {
 }  # fmt: skip
 """Names in other libraries, and the corresponding names or advice here, the best first.
 
-Stable-Baselines3, CleanRL, scikit-learn and Keras have them.
+Stable-Baselines3, CleanRL, scikit-learn and Keras have them. Advice is a sentence; only its spaces
+distinguish it from a name.
 """
 HABITS = {habit.lower(): hints for habits, hints in _MEANINGS.items() for habit in habits}
+"""The hints of `_MEANINGS` by each of its names, in lower case."""
 
 
 def advice(
@@ -115,7 +118,9 @@ def advice(
 ) -> str:
     """Return a hint for an unknown name: a suggestion, and all possible names by similarity.
 
-    ``elsewhere`` has names that are possible in other places, and how they are written there.
+    ``elsewhere`` has names that are possible in other places, and how they are written there. The
+    suggestion is, in this order: the same word or what another library means by it, the sentence
+    about it, or a name that looks alike. It may be missing.
 
     >>> advice("gamma", ("epsilon", "discount"))
     'did you mean discount? possible: discount, epsilon'
@@ -125,31 +130,34 @@ def advice(
     known = tuple(possible)
     word = name.strip("-").replace("-", "_").lower()
     meanings = (word, *HABITS.get(word, ()))
-    near = difflib.get_close_matches(name, known, n=3, cutoff=0.5)  # listed first
-    near = [meaning for meaning in meanings if meaning in known] + near
-    hints = [meaning for meaning in meanings if meaning in known]
-    hints += [elsewhere[meaning] for meaning in meanings if meaning in elsewhere]
+    known_meanings = [meaning for meaning in meanings if meaning in known]
+    suggestions = known_meanings + [elsewhere[other] for other in meanings if other in elsewhere]
     sentence = next((meaning for meaning in meanings if " " in meaning), "")
-    if not sentence:  # a suggestion must be more alike
-        hints += difflib.get_close_matches(name, known, n=1, cutoff=0.7)
-        hints += map(elsewhere.__getitem__, difflib.get_close_matches(name, elsewhere, 1, 0.8))
+    if not sentence:
+        # Chosen limits: names of other places must be more alike.
+        suggestions += difflib.get_close_matches(name, known, n=1, cutoff=0.7)
+        alike_elsewhere = difflib.get_close_matches(name, elsewhere, n=1, cutoff=0.8)
+        suggestions += [elsewhere[alike] for alike in alike_elsewhere]
     hint = f"{sentence}; " if sentence else ""
-    if hints:
-        hint = f"did you mean {hints[0]}? "
-    listed = ", ".join(dict.fromkeys([*near, *known]))
+    if suggestions:
+        hint = f"did you mean {suggestions[0]}? "
+    alike = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
+    listed = ", ".join(dict.fromkeys([*known_meanings, *alike, *known]))
     return f"{hint}possible: {listed}" if known else hint.strip("; ")
 
 
 def error_of_name(package: str, name: str, names: Iterable[str], others: str = "") -> Exception:
-    """Return the error about a name that a package lacks; its ``__getattr__`` calls this.
+    """Return the error about a name that a package lacks.
 
+    Only the package's ``__getattr__`` may call it: the caller of that decides on the error's class.
     ``names`` are those of the package, ``others`` packages in which imported names are looked up.
     Python replaces an AttributeError where a name is imported, so that advice needs an ImportError.
     """
     plain = AttributeError(f"module {package!r} has no attribute {name!r}")
     if name.startswith("_") or find_spec(f"{package}.{name}") is not None:
         return plain
-    is_imported = sys._getframe(2).f_code.co_name == "_handle_fromlist"  # of importlib
+    # `from package import name` calls `__getattr__` from this function of importlib.
+    is_imported = sys._getframe(2).f_code.co_name == "_handle_fromlist"
     elsewhere = {known: known for known in names}
     for other in others.split() if is_imported else ():
         for known in import_module(other).__all__:

@@ -12,9 +12,10 @@ def attach(
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
     """Make ``__getattr__``, ``__dir__`` and ``__all__`` of a package that imports names on demand.
 
-    ``names`` has the names of each module, with spaces between them; those of the package are its
-    modules. Type checkers read them in the stub beside the package, which a frozen program lacks.
-    Errors about a name that is in one of the packages ``others`` say so.
+    ``names`` maps each module to the names that it provides, with spaces between them; the names of
+    the package itself are its submodules. Type checkers read a stub beside the package instead; it
+    cannot replace ``names``, as a frozen program lacks it. If an unknown name is in one of the
+    packages ``others``, also with spaces between them, the error says so.
 
     >>> load, names, public = attach("sdnn", {"sdnn": "coding", "sdnn.estimators": "SDNNRegressor"})
     >>> load("coding").__name__, names(), public

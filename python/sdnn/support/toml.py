@@ -13,9 +13,9 @@ from typing import TypeAlias, cast
 
 import msgspec
 
-MOST_LEVELS = 32  # largest depth of nested tables and arrays
+MOST_LEVELS = 32  # largest depth of nested tables and arrays; chosen
 TOO_DEEP = f"must have at most {MOST_LEVELS} tables and arrays within each other"
-_MOST_PARSED = 2**21  # bytes that are parsed to find a line; in larger files none is found
+_MOST_PARSED = 2**21  # characters that are parsed to find a line before the search is given up
 
 KeyPath: TypeAlias = tuple[str | int, ...]
 """Keys from the top of a document to a value; elements of arrays are numbers from 0."""
@@ -24,19 +24,24 @@ KeyPath: TypeAlias = tuple[str | int, ...]
 def line_of(text: str, key: KeyPath) -> int | None:
     """Return the line, from 1, of a key in TOML, or of the nearest table around it.
 
-    The result is the smallest number of lines that, parsed alone, contain the key.
+    None if not even its table is there, or too much would have to be parsed. The parser reports no
+    positions. So the result is the smallest number of lines that, parsed alone, contain the key. A
+    binary search finds it: once the key is there, more lines leave it there.
     """
     lines = text.splitlines()
     n_left = _MOST_PARSED
 
-    def begins(last: int) -> bool:
-        """Return whether the lines up to index ``last``, with their last value, have the key."""
+    def has_key(last: int) -> bool:
+        """Return whether the lines up to index ``last`` have the key.
+
+        Where they end within a value, such as a list of several lines, its other lines are added.
+        """
         nonlocal n_left
         for end in range(last + 1, len(lines) + 1):
             beginning = "\n".join(lines[:end])
             n_left -= len(beginning)
             if n_left < 0:
-                raise OverflowError
+                raise OverflowError  # ends the search, below
             try:
                 functools.reduce(operator.getitem, key, msgspec.toml.decode(beginning))
                 return True
@@ -48,18 +53,21 @@ def line_of(text: str, key: KeyPath) -> int | None:
 
     with suppress(OverflowError):
         while key:
-            index = bisect.bisect_left(range(len(lines)), True, key=begins)
+            index = bisect.bisect_left(range(len(lines)), True, key=has_key)
             if index < len(lines):
                 return index + 1
-            key = key[:-1]
+            key = key[:-1]  # look for the table around it
     return None
 
 
 def parse_toml(text: str) -> dict[str, object]:
-    """Parse TOML; ValueError for keys of many parts, whose parsing takes quadratic time."""
-    for part in re.split(r"[={},\n]", text):
-        if part.count(".") > MOST_LEVELS:
-            raise ValueError(f"a key must have at most {MOST_LEVELS} parts, got {part[:40]!r}...")
+    """Parse TOML; ValueError for keys of many parts, whose parsing takes quadratic time.
+
+    Every key lies between two of the characters at which the text is split.
+    """
+    for piece in re.split(r"[={},\n]", text):
+        if piece.count(".") > MOST_LEVELS:
+            raise ValueError(f"a key must have at most {MOST_LEVELS} parts, got {piece[:40]!r}...")
     values: dict[str, object] = msgspec.toml.decode(text)
     return values
 
