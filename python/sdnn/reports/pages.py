@@ -25,8 +25,10 @@ class Table:
     title: str
     header: tuple[str, ...]
     rows: Sequence[tuple[str, ...]]
-    kinds: Mapping[str, str] = field(default_factory=dict)  # color of a text: good, bad, open, none
-    brief: Sequence[str] = ()  # columns that a terminal shows by default; empty: all
+    kinds: Mapping[str, str] = field(default_factory=dict)
+    """Colors of cells on an HTML page, by their text: "good", "bad", "open" or "none"."""
+    brief: Sequence[str] = ()
+    """Columns that a terminal shows by default; empty: all."""
 
     def print(self, console: Console, *, full: bool = True) -> None:
         """Print all columns (`full`), or the brief ones, which fit 80 characters."""
@@ -49,9 +51,10 @@ class Table:
 class Section:
     """A part of a page, shown in the order of its fields; empty fields are left out.
 
-    The default title is that of the table; a title of level 0 is a faint paragraph. Pictures are
-    SVG; a narrow one, PNG, replaces them on telephones. Folded sections have notes, terms, text
-    and a table, and open on demand.
+    The default title is that of the table; its level is that of the HTML heading, or 0 for a faint
+    paragraph. Pictures are SVG, with ``alt`` as their description; a narrow one, PNG, replaces them
+    on telephones. ``is_narrow`` sections have pictures that do not fill the page. Folded sections
+    have notes, terms, text and a table, and open on demand.
     """
 
     title: str = ""
@@ -104,8 +107,8 @@ class Page:
         folded = (part for section in self.sections for part in section.folded if not part.text)
         sections = [*self.sections, *folded]
         notes = [note for section in sections for note in section.notes]
-        terms = [item for section in sections for item in section.terms.items()]
-        return notes + [f"{name}: {text}." for name, text in terms]
+        terms = [term for section in sections for term in section.terms.items()]
+        return notes + [f"{name}: {meaning}." for name, meaning in terms]
 
     def print(self, console: Console, *, full: bool = False) -> None:
         """Print the page without figures: tables that fit 80 characters, or everything (`full`)."""
@@ -154,7 +157,7 @@ def plain_number(value: float, decimals: int, sign: str = "") -> str:
     >>> plain_number(2.50, 2), plain_number(-0.01, 1), plain_number(1234.25, 2, sign="+")
     ('2.5', '0', '+1,234.25')
     """
-    rounded = round(value, decimals) or 0.0
+    rounded = round(value, decimals) or 0.0  # no -0.0
     text = f"{rounded:{sign},.{decimals}f}".rstrip("0").rstrip(".")
     return text if rounded else "0"
 
