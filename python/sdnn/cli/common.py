@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 import traceback
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from signal import SIGINT, SIGTERM
@@ -67,14 +67,15 @@ def explained_option(error: click.NoSuchOption) -> click.UsageError:
         for name in (*parameter.opts, *parameter.secondary_opts)
         if name.startswith("--")
     }  # fmt: skip
-    elsewhere = {}
-    if "set" in options:
+    written = {}  # how the command line writes each name
+    if "set" in options:  # the command has options for the keys of a specification
         from sdnn.runs.settings import KEYS_BY_NAME
 
-        elsewhere = {name: option_of(key) for name, key in KEYS_BY_NAME.items()}
-        elsewhere = {n: f"{o}=..." if o.startswith("--set") else o for n, o in elsewhere.items()}
-        elsewhere["environment"] = "the argument ENV_ID"
-    hint = advice(error.option_name, options.values(), elsewhere | options)
+        for name, key in KEYS_BY_NAME.items():
+            option = option_of(key)
+            written[name] = f"{option}=..." if option.startswith("--set") else option
+        written["environment"] = "the argument ENV_ID"
+    hint = advice(error.option_name, options.values(), written | options)
     return click.UsageError(f"No such option: {error.option_name}: {hint}", context)
 
 
@@ -170,12 +171,13 @@ def run_command(
         except Exception as error:  # an error in a user's environment needs its traceback
             frames = traceback.walk_tb(error.__traceback__)
             is_of_environment = any(isinstance(f.f_locals.get("self"), gym.Env) for f, _ in frames)
-            is_of_file = isinstance(error, OSError) and not is_of_environment
-            if not is_of_file and (way := _how_to_resume(folder)):
-                click.echo("failed" + way, err=True)
-            if is_of_file or not isinstance(error, OSError):
-                raise
-            raise RuntimeError(f"the environment failed: {error}") from error
+            if isinstance(error, OSError) and not is_of_environment:
+                raise  # an error of a file, which the group of commands reports in a line
+            if remedy := _how_to_resume(folder):
+                click.echo("failed" + remedy, err=True)
+            if isinstance(error, OSError):
+                raise RuntimeError(f"the environment failed: {error}") from error
+            raise
 
 
 def _how_to_resume(folder: Path | None) -> str:
@@ -208,25 +210,39 @@ def train_run(
         click.echo(json_text({"folder": str(run.folder), **facts}))
         return
     report = outcome.learning_report
-    within, beyond = [], []
-    if report is not None and not outcome.is_solved:  # a solved task needs no other ranges
-        # A range is much too wide if less than a tenth is used, too narrow if more is beyond it.
-        shares = enumerate(report["share_of_range"])
-        within = [i for i, s in shares if s and s < 0.1 and i not in report["fitted"]]
-        beyond = [i for i, s in enumerate(report["share_beyond_range"]) if s and s > 0.1]
+    is_improvable = report is not None and not outcome.is_solved
+    too_wide, too_narrow = _unsuitable_ranges(report) if is_improvable else ([], [])
     text = rendered(
         "outcome.txt.jinja",
         run=run,
         outcome=outcome,
         report=report,
-        within=within,
-        beyond=beyond,
+        too_wide=too_wide,
+        too_narrow=too_narrow,
         warming_up=WARMING_UP,
         resume=resume_command(run.folder, "--steps", "N"),
         folder=str(run.folder),
         quoted=shlex.quote(str(run.folder)),
     )
     click.echo(text)
+
+
+def _unsuitable_ranges(report: Mapping[str, Any]) -> tuple[list[int], list[int]]:
+    """Return the observed variables whose ranges are much too wide, and those too narrow.
+
+    Too wide: less than a tenth is used, unless the agent fits the range itself. Too narrow: more
+    than a tenth of the observations are beyond it. The tenths are chosen. Shares may be None, where
+    a variable has no range.
+    """
+    too_wide = [
+        i
+        for i, share in enumerate(report["share_of_range"])
+        if share and share < 0.1 and i not in report["fitted"]
+    ]
+    too_narrow = [
+        i for i, share in enumerate(report["share_beyond_range"]) if share and share > 0.1
+    ]
+    return too_wide, too_narrow
 
 
 def rendered(template: str, **values: object) -> str:

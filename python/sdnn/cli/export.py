@@ -14,6 +14,7 @@ import click
 from sdnn.cli.common import (
     NEW_FILE,
     SEED,
+    Options,
     json_option,
     json_text,
     named_values,
@@ -35,9 +36,9 @@ if TYPE_CHECKING:
     from sdnn.export import CHeader, EstimatorHeader
 
 _ESTIMATORS = ("SDNNRegressor", "SDNNClassifier")
-_MOST_ACTIONS = 2**16
-_FEW_STEPS = 64  # of fixed point, in a range that is hardly resolved
-_LARGEST = 2**31  # limit of the ranges of observations and actions
+_MOST_ACTIONS = 2**16  # of --actions N, so that a mistyped number takes no memory; chosen
+_FEW_STEPS = 64  # a range with fewer steps of fixed point is reported as coarse; chosen
+_LARGEST = 2**31  # bounds of --range and --actions are below it: headers have 32-bit numbers
 
 
 @click.command(short_help="Write an agent or estimator as a C header, for small processors.")
@@ -157,9 +158,48 @@ def export(
     sdnn export --new --range -2.4:2.4 --range -3:3 --range -0.21:0.21
       --range -3.5:3.5 --actions 2 --c-header pole.h
     """  # noqa: D301
-    from sdnn.export import c_header, export_estimator_header
-    from sdnn.support.files import write_whole
+    _check_source(source, new, options)
+    learning = learning or new
+    if durations and not learning:
+        raise click.UsageError("--durations needs --learning or --new: policies learn nothing")
+    with run_command(option_words if source is None else words_of_run(source)):
+        model = None if source is None or source.is_dir() else _estimator_in(source)
+        if model is not None:
+            if durations:
+                raise click.UsageError("--durations is for agents: an estimator has no steps")
+            if fraction_bits is not None:
+                raise click.UsageError("--fraction-bits is for agents: an estimator has doubles")
+            header = _write_estimator(model, path, name, learning, flash)
+            click.echo(_words(path, header, learning, {} if as_json else None))
+            return
+        if source is None:
+            agent = _new_agent(durations=durations, **options)
+        else:
+            agent = _read_agent_of(source)
+        try:
+            agent_header = _write_agent(
+                agent, path, name, learning, flash, durations, fraction_bits
+            )
+        except (TypeError, RuntimeError) as error:
+            place = "" if source is None else f"{source}: "
+            raise click.ClickException(f"{place}{error}") from error
+    for warning in _coarse_ranges(agent, agent_header.fraction_bits):
+        click.echo(f"warning: {warning}", err=True)
+    if as_json:
+        more = {"scaling": None if agent.scaling is None else agent.scaling.values()}
+        click.echo(_words(path, agent_header, learning, more))
+        return
+    words = _words(path, agent_header, learning)
+    click.echo(f"{words}, {agent_header.n_words:,} words of weights read per decision")
+    for line in _observed(agent):
+        click.echo(line)
 
+
+def _check_source(source: Path | None, new: bool, options: Options) -> None:
+    """Check that there is either a RUN or --new; ``options`` are those of new agents.
+
+    UsageError if not, if a new agent lacks its ranges or actions, or if RUN has such options.
+    """
     if new and source is not None:
         raise click.UsageError(f"--new makes an agent that needs no RUN: omit {source}, or --new")
     if not new and source is None:
@@ -171,71 +211,68 @@ def export(
             raise click.UsageError(f"--new needs {option}, once or more: see sdnn export --help")
         if not new and is_given:
             raise click.UsageError(f"{option} needs --new: the agent of RUN has its own")
-    learning = learning or new
-    if durations and not learning:
-        raise click.UsageError("--durations needs --learning or --new: policies learn nothing")
-    with run_command(option_words if source is None else words_of_run(source)):
-        model = None if source is None or source.is_dir() else _estimator_in(source)
-        prefix = path.stem if name is None else name
-        if model is not None:
-            if durations:
-                raise click.UsageError("--durations is for agents: an estimator has no steps")
-            if fraction_bits is not None:
-                raise click.UsageError("--fraction-bits is for agents: an estimator has doubles")
-            with _errors_of_options(name, flash_bytes="--flash"):
-                made = export_estimator_header(
-                    model, path, name=prefix, learning=learning, flash_bytes=flash
-                )
-            click.echo(_words(path, made, learning, {} if as_json else None))
-            return
-        if source is None:
-            agent = _new_agent(durations=durations, **options)
-        else:
-            agent = _read_agent_of(source)
-        try:
-            with _errors_of_options(name, fraction_bits="--fraction-bits", durations="--durations"):
-                header = c_header(
-                    agent,
-                    prefix,
-                    fraction_bits=fraction_bits,
-                    learning=learning,
-                    durations=durations,
-                )
-        except (TypeError, RuntimeError) as error:
-            place = "" if source is None else f"{source}: "
-            raise click.ClickException(f"{place}{error}") from error
-        if flash is not None and header.flash_bytes > flash:
-            raise click.UsageError(
-                f"--flash must be at least {header.flash_bytes}, for the constants of this agent,"
-                f" got {flash}: make it with fewer units or inputs, such as by --ram with --new"
-            )
-        write_whole(path, header.text.encode())
-    for warning in _coarse_ranges(agent, header.fraction_bits):
-        click.echo(f"warning: {warning}", err=True)
-    scaling = agent.scaling
-    if as_json:
-        more = {"scaling": None if scaling is None else scaling.values()}
-        click.echo(_words(path, header, learning, more))
-        return
-    words = _words(path, header, learning)
-    click.echo(f"{words}, {header.n_words:,} words of weights read per decision")
+
+
+def _write_estimator(
+    model: Fitted, path: Path, name: str | None, learning: bool, flash: int | None
+) -> EstimatorHeader:
+    """Write the header of an estimator; errors name the options."""
+    from sdnn.export import export_estimator_header
+
+    prefix = path.stem if name is None else name
+    with _errors_of_options(name, flash_bytes="--flash"):
+        return export_estimator_header(
+            model, path, name=prefix, learning=learning, flash_bytes=flash
+        )
+
+
+def _write_agent(
+    agent: AnyAgent,
+    path: Path,
+    name: str | None,
+    learning: bool,
+    flash: int | None,
+    durations: bool,
+    fraction_bits: int | None,
+) -> CHeader:
+    """Write the header of an agent; errors name the options. TypeError if it has no header."""
+    from sdnn.export import c_header
+    from sdnn.support.files import write_whole
+
+    prefix = path.stem if name is None else name
+    with _errors_of_options(name, fraction_bits="--fraction-bits", durations="--durations"):
+        header = c_header(
+            agent, prefix, fraction_bits=fraction_bits, learning=learning, durations=durations
+        )
+    if flash is not None and header.flash_bytes > flash:
+        raise click.UsageError(
+            f"--flash must be at least {header.flash_bytes}, for the constants of this agent,"
+            f" got {flash}: make it with fewer units or inputs, such as by --ram with --new"
+        )
+    write_whole(path, header.text.encode())
+    return header
+
+
+def _observed(agent: AnyAgent) -> Iterator[str]:
+    """Yield lines about what an agent observes in place of an environment's observations."""
     for statistics in agent.wrappers:
         if lines := statistics.observation_lines():
-            click.echo(
+            yield (
                 f"it observes what the wrapper {statistics.wrapper} gave, (value - mean) /"
                 " sqrt(variance):"
             )
-            for line in lines:
-                click.echo(f"  {line}")
-    if scaling is not None:
-        click.echo("it observes each variable scaled from its range to [0, 1], as its run did:")
-        for line in scaling.lines():
-            click.echo(f"  {line}")
+            yield from (f"  {line}" for line in lines)
+    if agent.scaling is not None:
+        yield "it observes each variable scaled from its range to [0, 1], as its run did:"
+        yield from (f"  {line}" for line in agent.scaling.lines())
 
 
 @contextmanager
 def _errors_of_options(name: str | None, **options: str) -> Iterator[None]:
-    """Turn errors about arguments of a header into those of the command's options."""
+    """Turn errors about arguments of a header into those of the command's options.
+
+    ``name`` is the value of --name, ``options`` are the options of other arguments by their names.
+    """
     options["name"] = "--c-header gives no name; use --name, which" if name is None else "--name"
     try:
         yield
@@ -249,7 +286,10 @@ def _errors_of_options(name: str | None, **options: str) -> Iterator[None]:
 def _words(
     path: Path, header: CHeader | EstimatorHeader, learning: bool, more: Data | None = None
 ) -> str:
-    """Describe a header, whose agent may learn: in a line, or as JSON with the values ``more``."""
+    """Describe a header: in a line, or as JSON with the values ``more`` if these are not None.
+
+    ``learning`` is whether its agent or estimator learns, and so keeps its arrays.
+    """
     if more is not None:
         values = {k: v for k, v in dataclasses.asdict(header).items() if k != "text"}
         return json_text({"file": str(path), **values, **more})
@@ -283,7 +323,7 @@ def _coarse_ranges(agent: AnyAgent, fraction_bits: int) -> Iterator[str]:
     if not agent._action.discrete:
         bounds = zip(agent._action.low, agent._action.high, strict=True)
         ranges += [("action", "give", i, low, high) for i, (low, high) in enumerate(bounds)]
-    for name, verb, i, low, high in ranges:
+    for name, verb, i, low, high in ranges:  # verb: what the program does with the variable
         n_steps = float(high - low) * 2.0**fraction_bits
         if n_steps < _FEW_STEPS:
             yield (
