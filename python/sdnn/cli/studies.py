@@ -18,6 +18,7 @@ from sdnn.support.arguments import blamed
 
 if TYPE_CHECKING:
     from sdnn.runs.engine import Executor
+    from sdnn.runs.report import WrittenReport
     from sdnn.runs.study import Study
 
 
@@ -74,7 +75,10 @@ def study_command(make_study: Callable[..., Study]) -> Function:
         *, where: str, jobs: int | None, scheduler: str | None, scheduler_timeout: float | None,
         out: Path, as_json: bool, full: bool, dry_run: bool, **options: object,
     ) -> None:  # fmt: skip
-        """Run the study that the options describe, print its results, and exit with a status."""
+        """Run the study that the options describe, print its results, and exit with a status.
+
+        The status is 1 if a trial failed or nothing is complete.
+        """
         from rich.console import Console
 
         from sdnn.reports.pages import duration_words
@@ -100,36 +104,40 @@ def study_command(make_study: Callable[..., Study]) -> Function:
                 click.echo(text, nl=bool(text))
                 return
             with TrialBars(Console(stderr=True)) as observer:
-                done = run_study(study, out, executor=executor, observer=observer)
-        outcome = done.outcome
-        stored = (
-            f"{outcome.n_reused + outcome.n_run} of {outcome.n_planned} trials are stored in {out}"
-        )
-        for failure in outcome.failures:
-            message = f"{type(failure.error).__name__}: {failure.error}"
-            variants = ", ".join(study.variants_of(failure.planned.key))
-            click.echo(f"Error: {failure.planned.title} ({variants}) failed: {message}", err=True)
-        if outcome.interrupted:
-            then = f"; {stored}; the same command continues from there"
-            common.exit_interrupted(then, outcome.signal or SIGINT)
-        if done.page is None:
-            click.echo(f"Error: nothing is complete, no figure drawn; {stored}", err=True)
-        elif as_json:
-            click.echo(json.dumps(done.table, indent=2))
-        else:
-            done.page.print(common.make_console(), full=full)
-            page = next(str(file) for file in done.files if file.suffix == ".html")
-            summary = ""
-            if outcome.n_planned:
-                digest = str(done.table["digest"])[:16]
-                summary = f"{stored} ({outcome.n_run} run now); digest of the rows {digest}; "
-            click.echo(f"{summary}wrote {len(done.files)} files: see {page}")
-        if done.page is None or outcome.failures:
+                written = run_study(study, out, executor=executor, observer=observer)
+        _show(written, study, out, as_json=as_json, full=full)
+        if written.page is None or written.outcome.failures:
             raise click.exceptions.Exit(1)
 
     for option in reversed(_OPTIONS):
         option(command)
     return command
+
+
+def _show(written: WrittenReport, study: Study, out: Path, *, as_json: bool, full: bool) -> None:
+    """Print failures and results of a study; exit if a signal interrupted it."""
+    outcome = written.outcome
+    n_stored = outcome.n_reused + outcome.n_run
+    stored = f"{n_stored} of {outcome.n_planned} trials are stored in {out}"
+    for failure in outcome.failures:
+        message = f"{type(failure.error).__name__}: {failure.error}"
+        variants = ", ".join(study.variants_of(failure.planned.key))
+        click.echo(f"Error: {failure.planned.title} ({variants}) failed: {message}", err=True)
+    if outcome.interrupted:
+        then = f"; {stored}; the same command continues from there"
+        common.exit_interrupted(then, outcome.signal or SIGINT)
+    if written.page is None:
+        click.echo(f"Error: nothing is complete, no figure drawn; {stored}", err=True)
+    elif as_json:
+        click.echo(json.dumps(written.table, indent=2))
+    else:
+        written.page.print(common.make_console(), full=full)
+        page = next(str(file) for file in written.files if file.suffix == ".html")
+        summary = ""
+        if outcome.n_planned:  # not only costs
+            digest = str(written.table["digest"])[:16]
+            summary = f"{stored} ({outcome.n_run} run now); digest of the rows {digest}; "
+        click.echo(f"{summary}wrote {len(written.files)} files: see {page}")
 
 
 def _make_executor(

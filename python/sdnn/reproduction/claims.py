@@ -47,8 +47,9 @@ from sdnn.reproduction.cases import PAPER_CASES, PAPER_EPISODES, PAPER_TRIALS
 from sdnn.reproduction.cost import SERIES, CostConfig, CostRecord
 from sdnn.runs.results import STEP_MEASURES, CaseResult, MeasureName, TrialMeasures, on_equal_terms
 
-N_DRAWS = 10_000
+N_DRAWS = 10_000  # of ten trials; this and the next two numbers are chosen
 _N_RESAMPLES, _N_DRAWS_OF_EACH = 200, 250
+"""Resamples of the trials, for the interval of a chance, and draws of ten from each of them."""
 
 _FILES = files("sdnn.reproduction")
 
@@ -134,7 +135,11 @@ CLAIMS = msgspec.toml.decode(
 
 
 class Verdict(Enum):
-    """Outcome for a claim; the value is the word for readers."""
+    """Outcome for a claim or a check; the value is the text for readers.
+
+    Only a claim can be inconclusive: ten of very many trials neither show it nearly always nor
+    hardly ever. Undecided are those about which more trials are needed.
+    """
 
     HOLDS = "holds"
     FAILS = "does not hold"
@@ -148,6 +153,7 @@ ALWAYS, NEVER = 0.95, 0.05
 """A claim holds from the first share of draws of ten trials on, and does not up to the second."""
 
 _DECISIVE = (Verdict.FAILS, Verdict.NOT_RUN, Verdict.NOT_JUDGED, Verdict.UNDECIDED)
+"""Verdicts on a check that are those of its claim, the first one first; otherwise it holds."""
 
 
 def is_paper_scale(measured: TrialMeasures) -> bool:
@@ -167,8 +173,8 @@ def verdict_of(check: Check, estimate: Estimate) -> Verdict:
 class CheckOutcome:
     """A check with the estimate of its quantity, None where its trials were not run.
 
-    `samples` are the values that it was judged by, one array or two of a difference; censored ones
-    are cut off at `last_episode`.
+    `samples` are the values by which it was judged, one array (n_trials,) or the two of a
+    difference, none for times. Censored values are infinite, in a difference `last_episode`.
     """
 
     check: Check
@@ -258,14 +264,8 @@ def _judge_check(
     check: Check, measured: Mapping[Subject, TrialMeasures], costs: Sequence[CostRecord]
 ) -> CheckOutcome:
     """Estimate the quantity of a check, and judge it if it was measured in full."""
-    if check.measure is None:  # the quantity is a ratio of times
-        times = {c.n_inputs: c.microseconds for c in costs if c.series == check.series}
-        if not {check.n_inputs, check.n_fewer} <= times.keys():
-            return CheckOutcome(check, None, Verdict.NOT_RUN)
-        estimate = estimate_contrast(times[check.n_inputs], times[check.n_fewer], np.divide)
-        is_full = all(cost.config_hash == CostConfig().config_hash for cost in costs)
-        verdict = verdict_of(check, estimate) if is_full else Verdict.NOT_JUDGED
-        return CheckOutcome(check, estimate, verdict)
+    if check.measure is None:
+        return _judge_times(check, costs)
     if not measured.keys() >= set(check.subjects):
         return CheckOutcome(check, None, Verdict.NOT_RUN)
     results = [measured[subject] for subject in check.subjects]
@@ -279,6 +279,17 @@ def _judge_check(
     verdict = verdict_of(check, estimate) if is_judged else Verdict.NOT_JUDGED
     last_episode = min(result.last_episode for result in results)
     return CheckOutcome(check, estimate, verdict, samples, last_episode)
+
+
+def _judge_times(check: Check, costs: Sequence[CostRecord]) -> CheckOutcome:
+    """Estimate a ratio of times, and judge it if all costs were measured with full effort."""
+    times = {c.n_inputs: c.microseconds for c in costs if c.series == check.series}
+    if not {check.n_inputs, check.n_fewer} <= times.keys():
+        return CheckOutcome(check, None, Verdict.NOT_RUN)
+    estimate = estimate_contrast(times[check.n_inputs], times[check.n_fewer], np.divide)
+    is_full = all(cost.config_hash == CostConfig().config_hash for cost in costs)
+    verdict = verdict_of(check, estimate) if is_full else Verdict.NOT_JUDGED
+    return CheckOutcome(check, estimate, verdict)
 
 
 class TenTrials:

@@ -43,7 +43,11 @@ class CostSeries:
     growth: str  # what the number of operations is proportional to (mathtext)
     core_agent: Callable[..., _core.BareAgent | _core.PlainRBFQLearning]
     settings: Mapping[str, int] = field(default_factory=dict)  # that are not the default
-    is_plain: bool = False  # its product structure is unused: seconds a step with many inputs
+    is_plain: bool = False
+    """Whether every basis value is computed, without the use of their product structure.
+
+    Steps with many inputs then take seconds.
+    """
 
 
 SERIES = (
@@ -61,9 +65,10 @@ def cost_series(agents: Iterable[str] | None = None) -> tuple[CostSeries, ...]:
     """Return the curves of some agents (default: all); ValueError if there is no such agent."""
     if agents is None:
         return SERIES
-    pairs = [split_label(word) for word in agents]
-    chosen = [name for name, preset in pairs if preset is None]
-    return tuple(series for name in chosen for series in SERIES if series.agent == name)
+    labels = [split_label(agent) for agent in agents]
+    # Costs are those of default sizes: an agent with a preset has no curve.
+    names = [name for name, preset in labels if preset is None]
+    return tuple(series for name in names for series in SERIES if series.agent == name)
 
 
 class CostRecord(msgspec.Struct, frozen=True):
@@ -102,14 +107,15 @@ def load_costs(store: ResultStore, config_hash: str) -> tuple[CostRecord, ...]:
 class CostConfig:
     """Effort of the measurement of costs.
 
-    Each round gives the median over its steps; intervals are drawn from rounds.
+    Each round gives the median over its steps; intervals are drawn from rounds. The numbers are
+    chosen.
     """
 
     n_inputs: tuple[int, ...] = (2, 3, 4, 5, 6, 7, 8)
     n_rounds: int = 5
     round_seconds: float = 0.02
     n_slow_rounds: int = 3  # rounds of a single step, if a step takes longer than that
-    slow_seconds: float = 1.0  # the most for these rounds; else the first step is the only one
+    slow_seconds: float = 1.0  # limit of all these rounds; else the first step is the only one
     n_learned: int = 500  # steps before the first round: untrained weights are faster
     most_plain_inputs: int = 8  # limit of plain evaluations: a step with 8 takes seconds
 
@@ -175,21 +181,22 @@ def measure_steps(
         agent = series.core_agent(approximator=approximator, learning=entry.learning(), seed=SEED)
     except MemoryError:
         return None
-    first = _core.time_agent_steps(agent, 1, SEED)  # nanoseconds
-    step_seconds = float(first[0]) / 1e9
-    in_a_round = int(config.round_seconds / step_seconds)
-    # Steps before the measurement fill the agent's memory, and are a better estimate of the time.
-    n_learned = min(config.n_learned, in_a_round)
-    learning = _core.time_agent_steps(agent, n_learned, SEED + 1)
-    if n_learned:
-        in_a_round = int(config.round_seconds * 1e9 / float(np.median(learning)))
     table_bytes = entry.table_bytes(approximator) if entry.table_bytes else 0
-    if in_a_round <= 1:  # a single step fills a round
+    first_step = _core.time_agent_steps(agent, 1, SEED)  # nanoseconds, shape (1,)
+    step_seconds = float(first_step[0]) / 1e9
+    steps_per_round = int(config.round_seconds / step_seconds)
+    # Steps before the measurement fill the agent's memory, and are a better estimate of the time.
+    n_learned = min(config.n_learned, steps_per_round)
+    learning_steps = _core.time_agent_steps(agent, n_learned, SEED + 1)
+    if n_learned:
+        steps_per_round = int(config.round_seconds * 1e9 / float(np.median(learning_steps)))
+    if steps_per_round <= 1:  # a single step fills a round
         n_slow = min(config.n_slow_rounds, int(config.slow_seconds / step_seconds))
-        slow = _core.time_agent_steps(agent, n_slow, SEED + 2) if n_slow else first
-        return tuple((slow / 1e3).tolist()), 1, table_bytes
-    medians = tuple(
-        float(np.median(_core.time_agent_steps(agent, in_a_round, SEED + 2 + number))) / 1e3
+        slow_steps = _core.time_agent_steps(agent, n_slow, SEED + 2) if n_slow else first_step
+        return tuple((slow_steps / 1e3).tolist()), 1, table_bytes
+    rounds = (
+        _core.time_agent_steps(agent, steps_per_round, SEED + 2 + number)
         for number in range(config.n_rounds)
     )
-    return medians, in_a_round, table_bytes
+    medians = tuple(float(np.median(steps)) / 1e3 for steps in rounds)
+    return medians, steps_per_round, table_bytes

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from sdnn.runs.results import CaseResult
 
 MAX_STEPS = 50  # an episode's limit: the upper end of the steps axis
 LONG_EPISODES = 2_000  # from this number of learning episodes on, running medians are drawn
-_PANEL_HEIGHT = 3.3
+_TITLE_HEIGHT, _PANEL_HEIGHT = 1.1, 3.3  # inches; title and footer together
 _WARNING_COLOR = "#a31515"
 _MARKERS = ("o", "s", "^", "v")
 
@@ -35,8 +36,8 @@ def draw_experiment(
     n_rows = -(-len(experiment.cases) // n_columns)
     is_long = max(result.last_episode for result in results) >= LONG_EPISODES
     has_legend = len({result.agent for result in results}) > 1 or experiment not in EXPERIMENTS
-    height = 1.1 + n_rows * _PANEL_HEIGHT
-    figure = plots.new_figure(5.4 * n_columns, height)
+    height = _TITLE_HEIGHT + n_rows * _PANEL_HEIGHT
+    figure = plots.new_figure(plots.NARROW_WIDTH * n_columns, height)
     panels = figure.subplots(n_rows, n_columns, sharey=True, squeeze=False).ravel()
     colors = agent_colors(result.agent for result in results)
     for number, (case, axes) in enumerate(zip(experiment.cases, panels, strict=False)):
@@ -55,16 +56,13 @@ def draw_experiment(
         axes.set_visible(False)
     if has_legend:
         lines, titles = panels[0].get_legend_handles_labels()
-        lines, titles = lines[::-1], titles[::-1]
+        # `draw_steps` draws the last agent first, so that the first is on top.
+        legend: dict[str, Any] = {"handles": lines[::-1], "labels": titles[::-1]}
+        legend |= {"frameon": False, "loc": "upper right", "ncols": len(colors)}
         if narrow:
-            panels[0].legend(
-                lines, titles, frameon=False, fontsize=9, loc="upper right", ncols=len(colors)
-            )
-        else:
-            figure.legend(
-                lines, titles, frameon=False, fontsize=9.5, loc="upper right",
-                bbox_to_anchor=(0.99, 1 - 0.08 / height), ncols=len(colors),
-            )  # fmt: skip
+            panels[0].legend(fontsize=9, **legend)
+        else:  # beside the title, 0.08 inches below the top
+            figure.legend(fontsize=9.5, bbox_to_anchor=(0.99, 1 - 0.08 / height), **legend)
     _label(figure, experiment.title, results, smooth=is_long, quick=quick, narrow=narrow)
     return figure
 
@@ -74,9 +72,9 @@ def draw_cost(
 ) -> plots.Figure:
     """Draw the time of a step against the number of inputs, a line per series, on a log scale.
 
-    Exponential growth is a straight line there; quadratic growth bends. A dotted line continues
-    what SDNN-C needs with 4 inputs by its number of columns. With `quick` it is marked as
-    preliminary. With `narrow` the legend is above the panel, for telephones.
+    Exponential growth is a straight line there; quadratic growth bends. A dotted line extrapolates
+    SDNN-C's time with 4 inputs in proportion to its number of columns. With `quick` the figure is
+    marked as preliminary. With `narrow` the legend is above the panel, for telephones.
     """
     figure = plots.new_figure(plots.NARROW_WIDTH, 6.2) if narrow else plots.new_figure(9.4, 4.7)
     axes = figure.add_subplot()

@@ -11,7 +11,7 @@ import sdnn.reproduction.cost as cost
 from sdnn.agents.registry import agent_entry, split_label, title_of
 from sdnn.environments.paper_acrobot import PAPER_ACROBOT
 from sdnn.reports.pages import Section, Table
-from sdnn.reports.plots import NARROW_DPI, figure_bytes, png_bytes
+from sdnn.reports.plots import NARROW_DPI, Figure, figure_bytes, png_bytes
 from sdnn.reproduction.cases import (
     COST,
     EXPERIMENTS,
@@ -53,13 +53,13 @@ class PaperStudy(Study):
     Files of other agents, presets, trials, episodes or seeds than the default have these in their
     names, and those of a quick look are marked so. Costs are always measured in this process.
 
-    ValueError if the trials are too short or too long, no agent has one of the ids, or only costs
-    are asked for, of agents that have none.
+    ValueError if the trials are too short or too long, if an agent is not known, or if only costs
+    are requested, of agents whose cost is not measured.
 
     Parameters
     ----------
     word
-        What is run: one of `WORDS`. What is stored of the rest is shown, too.
+        The experiments to run: one of `WORDS`. Stored trials of the others are shown, too.
     n_trials, n_episodes
         Trials per case and agent, and learning episodes per trial, of which a test needs at least
         ten. By default the paper's, or with `quick` few.
@@ -102,6 +102,7 @@ class PaperStudy(Study):
         whole("episodes", episodes, PAPER_INTERVAL, MOST_EPISODES)
         super().__init__("", specs_of(cases, episodes), n_trials=trials, seed=seed)
         requested_pairs = {pair for e in self.experiments if e.id in requested for pair in e.pairs}
+        # The case and agent of each requested trial; what is stored of others is only shown.
         self.pairs = tuple(pair for pair in self.combinations if pair in requested_pairs)
         self.cost_config = cost.QUICK_COST if quick else CostConfig()
         self.costs = {}
@@ -113,10 +114,10 @@ class PaperStudy(Study):
                 f"agents whose cost is measured are {', '.join(measured)},"
                 f" got {', '.join(self.agents)}"
             )
-        # Names of files have a mark for each setting that is not the default.
-        self._marks = [
+        self._marks = [  # of the names of files: each setting that is not the default
             *self.agents,
-            *(["with"] if self.agents and presets else []),  # else "rbf-robust" is a preset
+            # Without "with", agent rbf and preset robust would look like rbf's preset robust.
+            *(["with"] if self.agents and presets else []),
             *presets,
             *([self.experiments[0].cases[0].id] if has_sensors else []),
             *([f"{trials}-trials"] if trials != defaults[0] else []),
@@ -130,7 +131,7 @@ class PaperStudy(Study):
         cost.measure_costs(self.costs, self.cost_config, store, observe)
 
     def other_work(self, out: Path) -> dict[str, object]:
-        """Count the costs that are asked for, and those that are stored."""
+        """Count the costs to be measured, and those of them that are stored."""
         measured: dict[str, object] = {}
         if (out / STORE_NAME).exists():
             with ResultStore(out, read_only=True) as store:
@@ -140,17 +141,17 @@ class PaperStudy(Study):
 
     def file_name(self, name: str) -> str:
         """Return a file name with the settings that differ, such as ``table-rbf-quick.json``."""
-        stem, _, kind = name.rpartition(".")
-        return "-".join([stem, *self._marks]) + f".{kind}"
+        stem, _, suffix = name.rpartition(".")
+        return "-".join([stem, *self._marks]) + f".{suffix}"
 
     def report(self, comparison: Comparison, store: ResultStore) -> Content | None:
         """Make the report of every experiment that is complete, and of costs.
 
-        None where trials that were asked for are missing.
+        None where requested trials are missing.
         """
-        if not comparison.measured.keys() >= set(self.pairs):
-            return None
         stored = comparison.measured.keys()
+        if not stored >= set(self.pairs):
+            return None
         collected = [(e, collect(e, comparison)) for e in self.experiments if e.pairs <= stored]
         stored_costs = cost.load_costs(store, self.cost_config.config_hash)
         series_ids = {series.id for series in cost.cost_series(self.agents or None)}
@@ -162,24 +163,31 @@ class PaperStudy(Study):
             agents=tuple(self.agents),
             reference=more_trials(result for _, results in collected for result in results),
         )
-        drawn, narrow, quick = {}, {}, self.quick
-        for experiment, results in collected:
-            name = f"experiment-{experiment.id}"
-            drawn[name] = draw_experiment(experiment, results, quick=quick)
-            narrow[name] = draw_experiment(experiment, results, quick=quick, narrow=True)
+        figures, narrow_figures = (_figures(report, narrow=narrow) for narrow in (False, True))
         files: dict[str, bytes] = {}
         if report.costs:
-            drawn["cost"] = draw_cost(report.costs, quick=quick)
-            narrow["cost"] = draw_cost(report.costs, quick=quick, narrow=True)
             files["cost.csv"] = csv_bytes(cost.COST_ROW_HEADER, cost.round_rows(report.costs))
-        for name, figure in drawn.items():
+        for name, figure in figures.items():
             files[f"{name}.png"], files[f"{name}.svg"] = figure_bytes(figure)
         files["results.csv"] = csv_bytes(ROW_HEADER, trial_rows(report.records))
         page = report.page(
-            {name: files[f"{name}.svg"] for name in drawn},
-            {name: png_bytes(figure, NARROW_DPI) for name, figure in narrow.items()},
+            {name: files[f"{name}.svg"] for name in figures},
+            {name: png_bytes(figure, NARROW_DPI) for name, figure in narrow_figures.items()},
         )
         return Content(page=page, table=report.to_json(), files=files, shown=report.records)
+
+
+def _figures(report: Report, *, narrow: bool) -> dict[str, Figure]:
+    """Draw the figures of a report by their file names without suffix; `narrow` for telephones."""
+    figures = {
+        f"experiment-{experiment.id}": draw_experiment(
+            experiment, results, quick=report.quick, narrow=narrow
+        )
+        for experiment, results in report.experiments
+    }
+    if report.costs:
+        figures["cost"] = draw_cost(report.costs, quick=report.quick, narrow=narrow)
+    return figures
 
 
 def _experiment_with_sensors(
@@ -273,7 +281,8 @@ def plan_trials(
     return Study("", specs_of(cases, n_episodes), n_trials=n_trials, seed=root_seed).plan()
 
 
-MIN_TRIALS_TO_DRAW = 2 * PAPER_TRIALS  # smallest number of trials from which draws of ten are made
+MIN_TRIALS_TO_DRAW = 2 * PAPER_TRIALS
+"""Smallest number of trials from which draws of ten are made; chosen."""
 
 CLAIMS_NOTE = "A claim is shown where the study has every case and agent that it speaks of."
 CHANCES_NOTE = (
