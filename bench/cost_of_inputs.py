@@ -39,7 +39,7 @@ N_SENSORS = (4, 5, 6)
 
 
 def measure(part, n_inputs):
-    """Columns of the network, and quartiles of its time."""
+    """Return the network's columns and the quartiles of its time; of trials, three equal means."""
     n_columns = SDNNCConfig().n_pattern_units * n_inputs * (n_inputs - 1)
     if part == "trial":
         times = [measure_decisions(n_inputs, NOISE, EFFORT)["mean"]] * 3
@@ -50,7 +50,7 @@ def measure(part, n_inputs):
 
 
 def timer(part, n_inputs):
-    """A function that times a part of a network at work."""
+    """Return a function that times a part of a network that has learned a little."""
     config = SDNNCConfig(n_inputs=n_inputs)
     rng = np.random.default_rng(SEED)
     network = _core.SDNNC(config, SEED)
@@ -72,10 +72,10 @@ def draw(results, path):
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     for part, (title, color, marker) in PARTS.items():
-        own = {key[1]: row for key, row in results.items() if key[0] == part}
-        x = np.array(list(own))
+        rows = {n_inputs: row for (name, n_inputs), row in results.items() if name == part}
+        x = np.array(list(rows))
         lower, y, upper = (
-            np.array([row[f"{quartile}_us"] for row in own.values()])
+            np.array([row[f"{quartile}_us"] for row in rows.values()])
             for quartile in ("lower", "median", "upper")
         )
         if len(x) > 3:

@@ -21,22 +21,19 @@ INCLUDE = Path(__file__).resolve().parents[1] / "cpp" / "include"
 
 def compiled(command: str, folder: str, scratch: Path) -> tuple[float, float, set[str]]:
     """Compile a unit; return its CPU seconds, its memory in MB and the files that it includes."""
-    words = shlex.split(command)
-    words[words.index("-o") + 1] = str(scratch / "unit.o")
-    listed = ["-MD", "-MF", str(scratch / "unit.d")]
+    arguments = shlex.split(command)
+    arguments[arguments.index("-o") + 1] = str(scratch / "unit.o")
+    arguments += ["-MD", "-MF", str(scratch / "unit.d")]  # lists the included files
     with subprocess.Popen(
-        [*words, *listed], cwd=folder, env={**os.environ, "CCACHE_DISABLE": "1"}
+        arguments, cwd=folder, env={**os.environ, "CCACHE_DISABLE": "1"}
     ) as compiler:
-        _, status, used = os.wait4(compiler.pid, 0)
+        _, status, usage = os.wait4(compiler.pid, 0)
         compiler.returncode = os.waitstatus_to_exitcode(status)
     if compiler.returncode != 0:
         sys.exit(f"a unit does not compile: {command}")
-    names = (scratch / "unit.d").read_text().replace("\\\n", " ").split()
-    return (
-        used.ru_utime + used.ru_stime,
-        used.ru_maxrss / 1024,
-        {os.path.realpath(n) for n in names},
-    )
+    included = (scratch / "unit.d").read_text().replace("\\\n", " ").split()
+    seconds, megabytes = usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+    return seconds, megabytes, {os.path.realpath(name) for name in included}
 
 
 def units_of(folder: str, targets: list[str]) -> list[dict[str, str]]:

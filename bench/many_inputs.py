@@ -2,8 +2,8 @@
 
     python bench/many_inputs.py [--inputs 4 32 100 ...]
 
-CartPole with inputs that carry no information, or with noisy copies of its own, each number of
-inputs in a process of its own. Trainings and the environment alone take turns, as in
+CartPole with inputs that carry no information, or with noisy copies of its inputs, each number of
+inputs in a separate process. Trainings and the environment alone take turns, as in
 training_steps.py. "MB" is the growth of the resident memory from before the agent was made until it
 has learned.
 """
@@ -51,7 +51,7 @@ def resident_mb() -> float:
 
 
 def make(n_inputs: int, others: str) -> Any:
-    """Make the task with a number of inputs, a multiple of its own for copies."""
+    """Make the task with a number of inputs, with copies a multiple of `TASK_INPUTS`."""
     env, n_others = gym.make(TASK), n_inputs - TASK_INPUTS
     if others == "irrelevant":
         return Sensors(env, irrelevant=n_others, ends=RANGES[TASK])

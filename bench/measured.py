@@ -45,10 +45,10 @@ from sdnn.support.files import write_whole
 
 EVIDENCE = Path(__file__).parents[1] / "docs" / "evidence"
 PACKED = "benchmarks.npz.xz"
-POLL_SECONDS = 0.1  # between two looks at whether it was interrupted
+POLL_SECONDS = 0.1  # longest wait for messages before an interrupt is noticed
 
 Key = tuple[Any, ...]
-"""Which measurement it is, in words and numbers."""
+"""The name of a measurement among those of its kind: texts and numbers that JSON can hold."""
 
 
 def options(doc: str, *, seeds: int, jobs: int = 1) -> argparse.ArgumentParser:
@@ -81,7 +81,7 @@ def measured(kind: str, folder: Path = EVIDENCE) -> dict[Key, dict[str, Any]]:
 def measure_missing(
     kind: str,
     measure: Callable[..., Mapping[str, Any]],
-    asked: Iterable[Key],
+    keys: Iterable[Key],
     arguments: argparse.Namespace,
     *,
     apart: bool = False,
@@ -91,17 +91,17 @@ def measure_missing(
     Parameters
     ----------
     kind
-        Of the measurements.
+        The name of these measurements in the store.
     measure
-        Gives a measurement from its key.
-    asked
-        The keys.
+        Returns the measurement of a key, whose parts are its arguments.
+    keys
+        The measurements to make.
     arguments
-        Options of the command.
+        The command's, as of `options`: --only chooses among the keys, --redraw measures nothing.
     apart
-        Whether each is measured in a process of its own, `jobs` at a time.
+        Whether each is measured in a separate process, `jobs` at a time.
     """
-    plan = [Work(key, Measure(measure)) for key in asked if is_wanted(key, arguments)]
+    plan = [Work(key, Measure(measure)) for key in keys if is_wanted(key, arguments)]
     executor = Processes(_measure, arguments.jobs) if apart else Here(_measure)
     if not arguments.redraw:
         run_missing(plan, executor, arguments.folder, lambda store: _Measurements(store, kind))
@@ -127,13 +127,17 @@ def run_missing(
 
 
 def _unpack(folder: Path, into: Path) -> None:
+    """Unpack a folder's store into a folder that has none; nothing where there is none packed."""
     if not (into / STORE_NAME).exists() and (folder / PACKED).exists():
         unpack((folder / PACKED).read_bytes(), into)
 
 
 @contextmanager
 def opened(folder: Path) -> Iterator[ResultStore]:
-    """Unpack the store, and pack it where no error left it in doubt."""
+    """Unpack a folder's store; pack it at the end of the block, and remove the unpacked one.
+
+    After an error in the block the unpacked store stays, and is continued next time.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     _unpack(folder, folder)
     unpacked = folder / STORE_NAME
@@ -187,12 +191,12 @@ class _Measurements:
 
 
 Run = Callable[[Any, Callable[[int], None]], Any]
-"""Gives what is stored of a planned trial; receives a function that reports how far it is."""
+"""Runs a planned trial and returns its results; its second argument reports finished episodes."""
 
 
 @dataclass(frozen=True)
 class Here:
-    """Runs in this process, one after the other."""
+    """An executor that runs in this process, one trial after the other."""
 
     run_one: Run
 
@@ -207,9 +211,9 @@ class Here:
 
 @dataclass(frozen=True)
 class Processes:
-    """Runs each in a process of its own, whose memory and processor time are its own.
+    """An executor that runs each trial in a new process, with separate memory and processor time.
 
-    What is sent there is unpickled after the modules are imported that register agents.
+    The process first imports the modules that register agents: a pickled trial may need them.
     """
 
     run_one: Run
@@ -247,6 +251,7 @@ class Processes:
 
 
 def _work(sender: Any, imports: Sequence[str], content: bytes) -> None:
+    """Run a pickled pair of `Run` and trial, and send messages: the life of a process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the first process decides
     try:
         for module in imports:

@@ -49,8 +49,8 @@ def pack(folder: Path) -> bytes:
     if records:
         tables = [record.rows.table for record in records]
         arrays |= _columns(tables)
-        same = zip(tables, _tables(arrays, about["length"]), strict=True)
-        if not all(one.tobytes() == other.tobytes() for one, other in same):
+        pairs = zip(tables, _tables(arrays, about["length"]), strict=True)
+        if not all(table.tobytes() == unpacked.tobytes() for table, unpacked in pairs):
             raise ValueError(f"the rows in {folder} are not those of episodes that can be packed")
     content = BytesIO()
     np.savez(content, **arrays)
@@ -75,8 +75,8 @@ def unpack(content: bytes, folder: Path) -> None:
                 record["key"] = TrialKey(*record["key"])
                 store.add(TrialRecord(**record, rows=TrialRows(table)))
             for kind, results in about["measurements"].items():
-                for key, one in results.items():
-                    store.put(kind, key, one)
+                for key, measurement in results.items():
+                    store.put(kind, key, measurement)
         store.path.replace(folder / STORE_NAME)
 
 

@@ -42,8 +42,8 @@ def to_markdown(results: dict[str, Any]) -> str:
     lines = [*describe_run(results), f"caches: {caches}; NumPy's products by {machine['blas']}"]
     about = "".join(f"- {line}\n" for line in lines)
     parts, *others = tables(results)
-    own = [row for row in parts.rows if not row[0].startswith("all ")]  # the first table has them
-    parts = replace(parts, rows=own)
+    # The first table has the passes, "all ... values".
+    parts = replace(parts, rows=[row for row in parts.rows if not row[0].startswith("all ")])
     return "\n".join([about, *map(_titled, [dense_table(results), parts, *others])])
 
 
@@ -61,11 +61,11 @@ def dense_table(results: Mapping[str, Any]) -> Table:
 def passes_table(passes: list[dict[str, Any]]) -> Table:
     """Return passes of networks that learned for a while beside loads of the lines they read."""
     rows = [
-        (f"{one['inputs']}", f"{one['episodes']:,}", one["level"],
-         *(f"{one[name]:.1f}" for name in ("pass", "plain_loads")),
-         f"{one['plain_loads'] / one['pass']:.0%}")
-        for one in passes
-        if one["level"] != "portable"
+        (f"{times['inputs']}", f"{times['episodes']:,}", times["level"],
+         *(f"{times[name]:.1f}" for name in ("pass", "plain_loads")),
+         f"{times['plain_loads'] / times['pass']:.0%}")
+        for times in passes
+        if times["level"] != "portable"
     ]  # fmt: skip
     return Table(
         "A pass beside plain loads of the lines that it reads (us, median)",

@@ -26,7 +26,7 @@ SMALLEST_SHARE = 1.0
 
 
 def short_name(symbol: str) -> str:
-    """A function's name without namespaces, arguments and template arguments."""
+    """Return a function's name without namespaces, arguments and template arguments."""
     symbol = symbol.replace("(anonymous namespace)::", "")
     symbol = re.sub(r"\[clone.*\]|\(.*", "", symbol).strip()
     previous = None
@@ -38,7 +38,7 @@ def short_name(symbol: str) -> str:
 
 
 def profile(program: str, benchmark: str) -> dict[str, float]:
-    """Per cent of samples by function."""
+    """Return the per cent of samples of each function that has at least `SMALLEST_SHARE`."""
     with tempfile.TemporaryDirectory() as folder:
         data = str(Path(folder) / "perf.data")
         command = ["perf", "record", "-q", "-F", "1999", "-o", data, program]
@@ -65,14 +65,14 @@ def passes(program: str) -> list[dict[str, Any]]:
         check=True, capture_output=True, text=True,
     )  # fmt: skip
     rows: dict[tuple[int, int, str], dict[str, Any]] = {}
-    for one in json.loads(done.stdout)["benchmarks"]:
-        if one.get("aggregate_name") != "median":
+    for benchmark in json.loads(done.stdout)["benchmarks"]:
+        if benchmark.get("aggregate_name") != "median":
             continue
-        name, _, inputs, episodes = one["run_name"].split("/")
-        number = int(inputs.partition(":")[2]), int(episodes.partition(":")[2])
-        level = one["label"]
-        row = dict(zip(("inputs", "episodes"), number, strict=True), level=level)
-        rows.setdefault((*number, level), row)[name] = round(one["cpu_time"], 2)
+        name, _, inputs, episodes = benchmark["run_name"].split("/")  # as "inputs:4"
+        n_inputs, n_episodes = (int(text.partition(":")[2]) for text in (inputs, episodes))
+        level = benchmark["label"]
+        row = {"inputs": n_inputs, "episodes": n_episodes, "level": level}
+        rows.setdefault((n_inputs, n_episodes, level), row)[name] = round(benchmark["cpu_time"], 2)
     return [rows[key] for key in sorted(rows)]
 
 

@@ -1,8 +1,8 @@
-"""Runs studies of agents, each trial in a process of its own, and clocks what it learns.
+"""Runs studies of agents, each trial in a separate process, and measures their learning curves.
 
-The store has the rows of all evaluations, as any trial of the engine, and the curve of each trial:
-at each evaluation its steps, the processor seconds of learning until then, and the mean return; and
-the bytes that are kept in order to continue, at the end.
+The store has the rows of all evaluations, as of any trial of the engine, and the curve of each
+trial: at each evaluation its steps, the processor seconds of learning until then, and the mean
+return; and the bytes of the training state at the end.
 """
 
 from __future__ import annotations
@@ -26,16 +26,20 @@ from sdnn.runs.study_file import StudyFile
 from sdnn.runs.trial import TrainingTrial, TrialKey, TrialRecord, TrialRows
 
 N_MILESTONE_EPISODES = 100
-"""Greedy episodes of the last evaluation, and of those at a milestone, whatever others have."""
+"""Least number of greedy episodes of the last evaluation, and of that at a milestone; chosen."""
 MILESTONES: dict[str, int] = {}
-"""Steps after which a case has such an evaluation; the modules of tasks enter them."""
+"""Steps of a case's milestone; the modules of tasks enter them."""
 
 Curves = Mapping[tuple[str, str], Sequence[Mapping[str, Any]]]
 """Curves of the trials by case and variant."""
 
 
 class Clock(Callback):
-    """Notes the curve of a training; it stands still during evaluations."""
+    """Notes the curve of a training; its time stands still during evaluations.
+
+    An evaluation has no callback at its beginning. So a wrapper of the evaluation's environment
+    pauses the clock, and the row of the evaluation starts it again.
+    """
 
     def __init__(self, training: Training, milestone: int | None = None) -> None:
         self._milestone = milestone
@@ -45,9 +49,10 @@ class Clock(Callback):
         if env.has_wrapper_attr("evaluation_steps"):  # endless, otherwise
             env = gym.wrappers.TimeLimit(env, env.get_wrapper_attr("evaluation_steps"))
         training.evaluation_env = _Pausing(env, self)
-        self._few = training.evaluation_episodes
-        self._expect_milestone(training)
-        self._began, self._paused = time.process_time(), None
+        self._usual_episodes = training.evaluation_episodes
+        self._set_episodes_of_next_evaluation(training)
+        self._began = time.process_time()  # later by the time of all evaluations
+        self._paused: float | None = None
 
     def pause(self) -> None:
         """Stand still until the evaluation is noted."""
@@ -63,18 +68,19 @@ class Clock(Callback):
         self.curve["mean_return"].append(round(row["mean_return"], 2))
         if training.is_finished:
             self.curve["bytes"] = n_bytes(training.agent)
-        self._expect_milestone(training)
+        self._set_episodes_of_next_evaluation(training)
         self._began += time.process_time() - self._paused
         self._paused = None
 
-    def _expect_milestone(self, training: Training) -> None:
-        following = min(training.n_steps + training.evaluate_every, training.steps)
-        is_one = following in (self._milestone, training.steps)
-        training.evaluation_episodes = max(self._few, N_MILESTONE_EPISODES * is_one)
+    def _set_episodes_of_next_evaluation(self, training: Training) -> None:
+        evaluated_at = min(training.n_steps + training.evaluate_every, training.steps)
+        is_milestone = evaluated_at in (self._milestone, training.steps)
+        n_least = N_MILESTONE_EPISODES if is_milestone else 0
+        training.evaluation_episodes = max(self._usual_episodes, n_least)
 
 
 class _Pausing(gym.Wrapper):
-    """Tells a clock when an evaluation begins."""
+    """Pauses a clock when an evaluation begins."""
 
     def __init__(self, env: gym.Env, clock: Clock) -> None:
         super().__init__(env)
@@ -86,7 +92,7 @@ class _Pausing(gym.Wrapper):
 
 
 def n_bytes(agent: Any) -> int:
-    """Count what is kept in order to continue learning."""
+    """Return the size of the training state: all that is needed to continue learning."""
     if hasattr(agent, "n_bytes"):
         return int(agent.n_bytes)
     return sum(array.nbytes for array in agent.state().values())
@@ -161,9 +167,11 @@ def curves(
     """
     stored = measured(kind, arguments.folder)
     results = {}
-    for (case, variant), one in study.combinations.items():
-        own = [stored[planned.key] for planned in one.trials if planned.key in stored]
-        old = [curve for key, curve in stored.items() if (*key[:2], key[4]) == (case, variant, "")]
-        if own or old:
-            results[case, variant] = own or old
+    for (case, variant), combination in study.combinations.items():
+        present = [stored[planned.key] for planned in combination.trials if planned.key in stored]
+        without_hash = [
+            curve for key, curve in stored.items() if (*key[:2], key[4]) == (case, variant, "")
+        ]
+        if present or without_hash:
+            results[case, variant] = present or without_hash
     return results

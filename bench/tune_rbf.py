@@ -127,12 +127,13 @@ def measure(stage: str, *key: Any) -> dict[str, Any]:
 def medians(results: dict[Key, dict[str, Any]], stage: str) -> dict[Setting, dict[str, float]]:
     """Return the medians over trials of each setting, the best score first."""
     groups = defaultdict(list)
-    for (name, *values, _), one in results.items():
+    for (name, *values, _), row in results.items():
         if name == stage:
-            groups[Setting(*values)].append(one)
+            groups[Setting(*values)].append(row)
+    names = (*WINDOWS, "score")
     middles = {
-        setting: {name: float(np.median([one[name] for one in of])) for name in (*WINDOWS, "score")}
-        for setting, of in groups.items()
+        setting: {name: float(np.median([row[name] for row in rows])) for name in names}
+        for setting, rows in groups.items()
     }
     return dict(sorted(middles.items(), key=lambda item: -item[1]["score"]))
 

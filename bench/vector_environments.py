@@ -23,12 +23,12 @@ STUDY = Path(__file__).with_suffix(".toml")
 
 
 def table_rows(results: Curves) -> Iterator[Sequence[str]]:
-    """Medians over the seeds, with 95 % bootstrap intervals."""
-    for (task, n), own in results.items():
-        middles = map(estimate_median, np.array([one["mean_return"] for one in own]).T)
+    """Yield medians over the seeds, with 95 % bootstrap intervals."""
+    for (task, n_environments), trials in results.items():
+        middles = map(estimate_median, np.array([curve["mean_return"] for curve in trials]).T)
         returns = (f"{m.value:.0f} ({m.lower:.0f} to {m.upper:.0f})" for m in middles)
-        us = np.median([1e6 * one["cpu_seconds"][-1] / one["steps"][-1] for one in own])
-        yield task, n, str(len(own)), *returns, f"{us:.0f}"
+        us = np.median([1e6 * curve["cpu_seconds"][-1] / curve["steps"][-1] for curve in trials])
+        yield task, n_environments, str(len(trials)), *returns, f"{us:.0f}"
 
 
 def main() -> None:

@@ -26,6 +26,7 @@ N_EPISODES = 15_000
 
 
 def dense_microseconds(n_inputs: int) -> float:
+    """Return the median time of a dense product of the network's size, after 10 that warm up."""
     product = _core.DenseProduct(900, 200 * n_inputs * (n_inputs - 1), 1)
     return float(np.median(product.run(40)[10:])) / 1000
 
@@ -55,18 +56,21 @@ def measure(case: str, number: int) -> dict[str, Any]:
 
 def table(results: dict[tuple[Any, ...], dict[str, Any]]) -> str:
     groups = defaultdict(list)
-    for (case, _), one in results.items():
-        groups[case].append(one)
+    for (case, _), row in results.items():
+        groups[case].append(row)
 
     def cells(case):
-        of = {name: np.array([one[name] for one in groups[case]]) for name in groups[case][0]
-              if name != "version"}  # fmt: skip
+        """Return the row of a case: medians and ranges of its trials, means over decisions."""
+
+        def column(name):
+            return np.array([row[name] for row in groups[case]])
 
         def spread(name):
-            return f"{np.median(of[name]):.1f} ({of[name].min():.1f} - {of[name].max():.1f})"
+            values = column(name)
+            return f"{np.median(values):.1f} ({values.min():.1f} - {values.max():.1f})"
 
         def mean(name, digits):
-            return f"{np.average(of[name], weights=of['decisions']):.{digits}f}"
+            return f"{np.average(column(name), weights=column('decisions')):.{digits}f}"
 
         return (
             case, spread("seconds"), mean("us_per_decision", 1), spread("dense_over_decision"),

@@ -49,8 +49,7 @@ def of_network(network, effort):
     levels = available_instruction_sets()
     dense = {"numpy": numpy_product(*size), "core": _core.DenseProduct(*size, SEED).run}
     passes = {level: at_level(level, parts.time_values) for level in levels}
-    taken = in_turns({**passes, **dense}, effort)
-    times = {name: spread(one) for name, one in taken.items()}
+    times = {name: spread(turns) for name, turns in in_turns({**passes, **dense}, effort).items()}
     least_dense = min(times[name]["median"] for name in dense)
     return {
         "values": {level: times[level] for level in levels},
@@ -60,7 +59,7 @@ def of_network(network, effort):
 
 
 def numpy_product(n_rows, n_columns):
-    """The run of NumPy's product; calling it from here costs less than a microsecond."""
+    """Return the run of NumPy's product; calling it from here costs less than a microsecond."""
     generator = np.random.default_rng(SEED)
     weights = generator.random((n_rows, n_columns), dtype=np.float32)
     vector = generator.random(n_columns, dtype=np.float32)
@@ -78,7 +77,7 @@ def numpy_product(n_rows, n_columns):
 
 
 def caches(folder=CACHE_FOLDER):
-    """Bytes of the first core's caches by name, such as L1d, L2."""
+    """Return the bytes of the first core's caches by name, such as L1d, L2."""
     measured = {}
     try:
         for index in sorted(folder.glob("index*")):
@@ -94,7 +93,7 @@ def caches(folder=CACHE_FOLDER):
 
 
 def blas():
-    """Which library computes NumPy's product."""
+    """Return the name and version of the library that computes NumPy's product."""
     try:
         measured = np.show_config(mode="dicts")["Build Dependencies"]["blas"]
     except (KeyError, TypeError):
@@ -103,7 +102,7 @@ def blas():
 
 
 def measure(*, quick=False):
-    """The results of ``sdnn bench --json``, with the yardsticks of each network."""
+    """Return the results of ``sdnn bench --json``, with the yardsticks of each network."""
     results = run_benchmarks(quick=quick)
     effort = QUICK if quick else Effort()
     machine = {**results["machine"], "caches": caches(), "blas": blas()}

@@ -107,7 +107,7 @@ def output(*command):
 
 
 def sizes(folder, task, *more):
-    """Bytes of flash, of static memory and of all functions' stacks, with the physics."""
+    """Return bytes of flash, of static memory and of all functions' stacks, with the physics."""
     options = ("-Os", "-fno-pie", "-fstack-usage", "-c", *CHIP, *more)
     path = program(folder / "chip.o", task, ARM, *options)
     text, data, bss = map(int, output("size", path)[0].splitlines()[1].split()[:3])
@@ -174,11 +174,13 @@ def main():
         emulator = ("qemu-arm", "-plugin", plugin, emulated)
         counts = []
         for n_steps in COUNTED:
-            said, counted = output(*emulator, n_steps, 3)
-            if said != output(*native, n_steps, 3)[0]:
-                raise SystemExit(f"after {n_steps} steps the emulated chip differs: {said}")
-            _, counted = output(*emulator, n_steps, 0)
-            counts.append(int(re.search(r"instructions (\d+)", counted)[1]))
+            emulated_return, _ = output(*emulator, n_steps, 3)
+            if emulated_return != output(*native, n_steps, 3)[0]:
+                raise SystemExit(
+                    f"after {n_steps} steps the emulated chip differs: {emulated_return}"
+                )
+            _, plugin_report = output(*emulator, n_steps, 0)
+            counts.append(int(re.search(r"instructions (\d+)", plugin_report)[1]))
         a_step = (counts[1] - counts[0]) / (COUNTED[1] - COUNTED[0])
         print(f"{a_step:,.0f} instructions a step")
         for megahertz in (48, 100, 600):

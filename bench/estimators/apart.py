@@ -45,7 +45,7 @@ N_RESAMPLES = 10_000
 
 def keys():
     """Keys, those of the slow model last."""
-    asked = [
+    unsorted = [
         (problem, model, fold)
         for fold in range(real.N_FOLDS)
         for data, models in ((REGRESSION_APART, REGRESSORS), (CLASSIFICATION_APART, CLASSIFIERS))
@@ -53,7 +53,7 @@ def keys():
         for model in models
         if model != SLOW or len(samples(problem)[0]) <= MOST_ROWS_OF_SLOW
     ]
-    return sorted(asked, key=lambda key: key[1] == SLOW)
+    return sorted(unsorted, key=lambda key: key[1] == SLOW)
 
 
 def rank_column(middles, models):

@@ -258,14 +258,14 @@ def main():
     )
     streams = [(stream, s) for stream, n in STREAMS.items() for s in range(n)]
     measure_missing("stream intervals", measure_stream, streams, arguments)
-    asked = [
+    probability_keys = [
         *((problem, name, s) for s in seeds for problem in problems.CLASSIFICATION
           for name in PROBABILITIES),
         *((problem, name, fold) for fold in range(real.N_FOLDS) for problem in MEASURED
           for name in OURS),
         *((LARGE, name, 0) for name in PROBABILITIES),
     ]  # fmt: skip
-    measure_missing("probabilities", measure_probabilities, asked, arguments)
+    measure_missing("probabilities", measure_probabilities, probability_keys, arguments)
     if arguments.only:
         return
     folder = arguments.folder

@@ -94,7 +94,7 @@ def demonstration(name, seed):
     model.fit(X, target(X))
     parts = np.array_split(lattice(), n_parts)
     wrong = errors(lattice(), np.concatenate([model.predict(part) for part in parts]))
-    results = dict(zip(("all", "data", "blank"), (round(one, 5) for one in wrong), strict=True))
+    results = dict(zip(("all", "data", "blank"), (round(rmse, 5) for rmse in wrong), strict=True))
     return {**results, "chosen": chosen(model)}
 
 

@@ -328,21 +328,27 @@ def table(problems, models, middles, shown=None):
     columns = [place for place, model in enumerate(models) if shown is None or model in shown]
     rows = []
     for problem, row in zip(problems, middles, strict=True):
-        told = [f"{m:.3f}" if np.isfinite(m) else "" for m in row]
-        rows.append(
-            (problem, *(f"**{told[i]}**" if row[i] == np.nanmax(row) else told[i] for i in columns))
-        )
-    return markdown(("problem", *(list(models)[i] for i in columns)), rows)
+        best = np.nanmax(row)
+        rows.append((problem, *(_score_cell(row[place], best) for place in columns)))
+    return markdown(("problem", *(list(models)[place] for place in columns)), rows)
+
+
+def _score_cell(score, best):
+    """Write a score, the best in bold; nothing if it was not measured."""
+    if not np.isfinite(score):
+        return ""
+    return f"**{score:.3f}**" if score == best else f"{score:.3f}"
 
 
 def rank_columns(title, models, middles):
     """Mean ranks by model, of those that were measured on all problems; and on such problems."""
-    own = np.array([model not in VARIANTS for model in models])
-    there = np.isfinite(middles)
-    columns = {f"{title}, rank": rank_column(models, middles, own & there.all(axis=0))}
-    if not there.all():
-        of_all = there.all(axis=1)
-        columns[f"{title}, on {of_all.sum()}"] = rank_column(models, middles[of_all], own)
+    is_ranked = np.array([model not in VARIANTS for model in models])
+    is_measured = np.isfinite(middles)
+    measured_on_all = is_measured.all(axis=0)
+    columns = {f"{title}, rank": rank_column(models, middles, is_ranked & measured_on_all)}
+    if not is_measured.all():
+        by_all = is_measured.all(axis=1)
+        columns[f"{title}, on {by_all.sum()}"] = rank_column(models, middles[by_all], is_ranked)
     return columns
 
 

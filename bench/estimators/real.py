@@ -61,24 +61,24 @@ SHOWN = (
 
 def make_model(make, X, seed):
     """A model with default settings, which codes words as its library suggests."""
-    words = [name for name in X if is_word(X[name])]
-    levels = [X[name].cat.categories for name in words]
-    model = make(seed, X.shape[1] - len(words) + sum(map(len, levels)))
-    if not words:
+    word_columns = [name for name in X if is_word(X[name])]
+    levels = [X[name].cat.categories for name in word_columns]
+    model = make(seed, X.shape[1] - len(word_columns) + sum(map(len, levels)))
+    if not word_columns:
         return model
     if hasattr(model, "coding"):
-        return model.set_params(coding=[(WithMissing(base=Symbolic()), words)])
+        return model.set_params(coding=[(WithMissing(base=Symbolic()), word_columns)])
     if hasattr(model, "categorical_features"):
         return model.set_params(categorical_features="from_dtype")
     inner = getattr(model, "model", model)
     if isinstance(inner, CatBoost):
-        inner.set_params(cat_features=words)
+        inner.set_params(cat_features=word_columns)
         return model
     if isinstance(inner, LGBMModel):  # finds the types of columns itself
         return model
     one_hot = OneHotEncoder(categories=levels, sparse_output=False)
     return make_pipeline(
-        ColumnTransformer([("words", one_hot, words)], remainder="passthrough"), model
+        ColumnTransformer([("words", one_hot, word_columns)], remainder="passthrough"), model
     )
 
 

@@ -193,9 +193,8 @@ def samples(name: str) -> tuple[pd.DataFrame, np.ndarray]:
     table = usable(table_of(package, item), target or "target", dropped)
     table = table.sample(min(len(table), MOST_ROWS), random_state=0)
     y = table.pop(target or "target").to_numpy()
-    words = {column: "category" for column in table if is_word(table[column])}
-    numbers = {column: float for column in table if column not in words}
-    return table.astype(words | numbers), y
+    types = {column: "category" if is_word(table[column]) else float for column in table}
+    return table.astype(types), y
 
 
 def main() -> None:

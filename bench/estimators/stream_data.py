@@ -145,11 +145,11 @@ def samples(name, seed):
     """Return the inputs of a stream, each a dict of floats, and its targets."""
     length = N_SAMPLES if name in SYNTHETIC else N_SHORT
     xs, ys = zip(*islice(STREAMS[name](seed), length), strict=True)
-    words = {key: {x[key] for x in xs} for key, value in xs[0].items() if isinstance(value, str)}
+    levels = {key: {x[key] for x in xs} for key, value in xs[0].items() if isinstance(value, str)}
     rows = []
     for x in xs:
-        row = {str(key): float(value) for key, value in x.items() if key not in words}
-        row |= {f"{key}={w}": float(x[key] == w) for key in words for w in sorted(words[key])}
+        row = {str(key): float(value) for key, value in x.items() if key not in levels}
+        row |= {f"{key}={w}": float(x[key] == w) for key in levels for w in sorted(levels[key])}
         rows.append(row)
     return rows, [float(y) for y in ys] if name in REGRESSION else list(ys)
 

@@ -175,7 +175,8 @@ def score(rows):
     return float(np.median([row.get("r2", row.get("accuracy")) for row in rows]))
 
 
-def told(value):
+def score_text(value):
+    """Write a score with two decimals, without "-0.00"; very bad ones only as such."""
     return "< -10" if value < -10 else f"{value:.2f}" if abs(value) >= 0.005 else "0.00"
 
 
@@ -183,8 +184,9 @@ def places(results, data, models):
     """Ranks of each model, one for each stream; a variant is ranked in SDNN's place."""
     others = [name for name in models if not name.startswith("SDNN")]
     ranks = {}
-    for own in reversed([name for name in models if name not in others]):  # SDNN last
-        names = [own, *others]
+    # SDNN itself comes last, so that the ranks of the others are those beside it.
+    for variant in reversed([name for name in models if name not in others]):
+        names = [variant, *others]
         scores = [[score(results[stream, name]) for stream in data] for name in names]
         ranks |= zip(names, rankdata(-np.array(scores), axis=0), strict=True)
     return {name: ranks[name] for name in models}
@@ -210,7 +212,7 @@ def by_stream(results, data, models):
         (
             stream,
             str(len(results[stream, "SDNN"])),
-            *(told(score(results[stream, m])) for m in models),
+            *(score_text(score(results[stream, m])) for m in models),
         )
         for stream in data
     ]
@@ -230,7 +232,7 @@ def draw_scores(results, path):
         for y, stream in enumerate(data):
             for x, name in enumerate(models):
                 weight = "bold" if ranks[y, x] < 2 else None
-                text = told(score(results[stream, name]))
+                text = score_text(score(results[stream, name]))
                 color = "white" if ranks[y, x] < 3.5 else "black"
                 axes.text(x, y, text, ha="center", va="center", weight=weight, color=color)
         seeds = [len(results[stream, "SDNN"]) for stream in data]

@@ -58,15 +58,15 @@ def _goal_rows(results: Curves) -> Iterator[Sequence[str]]:
         if np.isnan(returns).any() or not returns.size:
             continue
         n_reached = int((returns >= goal.at_least).sum())
-        asked = round(goal.share * returns.size)
+        n_required = round(goal.share * returns.size)
         reached = f"{n_reached} of {returns.size}"
         yield (
             case,
             f"{goal.steps:,}",
             number(goal.at_least),
             f"{number(np.median(returns))} ({number(returns.min())} to {number(returns.max())})",
-            reached if n_reached >= asked else f"**{reached}**",
-            f"{asked}",
+            reached if n_reached >= n_required else f"**{reached}**",
+            f"{n_required}",
         )
 
 
@@ -104,10 +104,11 @@ def _ours_rows(
 def _cost_rows(study: Study, results: Curves) -> Iterator[Sequence[str]]:
     """Medians of each agent over the cases."""
     for variant in study.variants:
-        own = [trials for (_, name), trials in results.items() if name == variant.id]
-        if own:
-            spent, kept = (np.median([f(t) for t in own]) for f in (_microseconds, _kibibytes))
-            yield variant.title, f"{spent:,.0f}", f"{kept:,.0f}"
+        cases = [trials for (_, name), trials in results.items() if name == variant.id]
+        if cases:
+            us = np.median([_microseconds(trials) for trials in cases])
+            kibibytes = np.median([_kibibytes(trials) for trials in cases])
+            yield variant.title, f"{us:,.0f}", f"{kibibytes:,.0f}"
 
 
 def _microseconds(trials: Trials) -> float:
@@ -161,14 +162,15 @@ def number(value: float) -> str:
 
 def title_of(study: Study, variant: str) -> str:
     """Return a variant's title."""
-    return next(one.title for one in study.variants if one.id == variant)
+    return next(known.title for known in study.variants if known.id == variant)
 
 
 def tables(study: Study, results: Curves) -> dict[str, str]:
     """Give each table by its name in the page."""
     goals = ("task", "steps", "goal", "median (range)", "seeds", "asked")
     losses = ("task", "agent", "its median", "ours", "of the way")
-    cases = [case.id for case in study.cases if any(case.id == one for one, _ in results)]
+    with_results = {case for case, _ in results}
+    cases = [case.id for case in study.cases if case.id in with_results]
     clean = [case for case in cases if parts_of(case)[1] == "clean"]
     changed = [case for case in cases if case not in clean]
     compared = [case for case in changed if any(k[0] == case and k[1] != OURS for k in results)]

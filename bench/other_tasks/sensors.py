@@ -31,9 +31,9 @@ class Sensors(gym.ObservationWrapper):
     hidden
         Indices of variables that are not observed.
     copies
-        Further sensors of every variable, each with noise of its own.
+        Number of further sensors of every variable, each with independent noise.
     irrelevant
-        Further inputs that carry no information, uniform in [-1, 1].
+        Number of further inputs that carry no information, uniform in [-1, 1].
     correlation
         Autocorrelation of these from step to step; above 0 they are a Gaussian AR(1) process.
     ends

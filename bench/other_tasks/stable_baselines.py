@@ -32,7 +32,7 @@ class PublishedConfig:
     Parameters
     ----------
     task
-        Those that were published for this one.
+        The task whose published settings are used.
     """
 
     task: str = "Pendulum"
@@ -84,7 +84,8 @@ class StableBaselinesTraining(Training):
         torch.set_num_threads(1)
         agent, training, settings = self.agent, self, dict(self.agent.settings)
         envs = getattr(self.env, "envs", [self.env])
-        env = DummyVecEnv([lambda one=one: one for one in envs])
+        # A default argument, since a lambda would see the last environment of the loop only.
+        env = DummyVecEnv([lambda env=env: env for env in envs])
         if settings.pop("normalize", False):
             env = VecNormalize(env, gamma=settings["gamma"])
             agent.normalize = env.normalize_obs

@@ -297,17 +297,17 @@ class SwiftSarsa(TileCodingSarsa):
 
     def step(self, active, reward: float) -> None:
         """Learn a reward and the value of the weights that are active after it."""
-        own = self._settings
+        settings = self._settings
         value = self._numbers[active, W].sum()
         error = reward + self._discount * value - self._value
         self._n_eligible = follow(
             self._numbers, self._eligible, self._n_eligible, error, self._v_delta, self._fade,
-            own.meta_step_size, np.log(own.smallest_step_size), np.log(own.largest_rate),
-            own.smallest_trace,
+            settings.meta_step_size, np.log(settings.smallest_step_size),
+            np.log(settings.largest_rate), settings.smallest_trace,
         )  # fmt: skip
         self._v_delta, self._n_eligible = begin(
-            self._numbers, self._eligible, self._n_eligible, active, own.largest_rate,
-            np.log(own.step_size_decay),
+            self._numbers, self._eligible, self._n_eligible, active, settings.largest_rate,
+            np.log(settings.step_size_decay),
         )  # fmt: skip
         self._value = value
 
