@@ -108,7 +108,7 @@ def processor_seconds(processes):
 
 
 def measure(folder, plan, executor, groups, observer=None):
-    """Trials a second, and processor milliseconds of each group of processes for a trial."""
+    """Return trials a second, and each group of processes' processor milliseconds for a trial."""
     with ResultStore(folder) as store:
         before = [processor_seconds(group) for group in groups]
         begin = time.monotonic()

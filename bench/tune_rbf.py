@@ -58,7 +58,7 @@ class Setting(NamedTuple):
 
 
 def stability_limit(setting: Setting) -> float:
-    """The gradient rate from which a correction overshoots by more than the error it corrects.
+    """Return the gradient rate from which a correction overshoots by more than its error.
 
     That is 2 / (alpha |phi|^2) where |phi|^2 is largest, at a corner of all 5 dimensions.
     """

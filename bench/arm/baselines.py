@@ -52,7 +52,7 @@ def friedman():
 
 
 def pendulum():
-    """The acceleration of a pendulum with friction and a motor, with noise."""
+    """Return states of a pendulum with friction and a motor, and its acceleration with noise."""
     random = np.random.default_rng(5)
     high = np.array([np.pi, 8, 2, 0.5])
     X = random.uniform(-high, high, (2000, 4))
@@ -91,7 +91,7 @@ class Problem:
         return self.X.shape[1]
 
     def integers(self, X):
-        """Inputs in 16 bits, as emlearn recommends for trees."""
+        """Return inputs in 16 bits, as emlearn recommends for trees."""
         share = (X - self.low) / (self.high - self.low)
         return np.clip(np.round(30_000 * share), -32_000, 32_000).astype(np.int16)
 
@@ -99,7 +99,7 @@ class Problem:
         return ((X - self.X.mean(axis=0)) / self.X.std(axis=0)).astype(np.float32)
 
     def score(self, outputs):
-        """R2, or the share of right classes."""
+        """Return R2, or the share of right classes."""
         if self.is_regression:
             return r2_score(self.test_y, outputs)
         return float(np.mean(outputs == self.test_y))
@@ -270,7 +270,7 @@ COLUMNS = ("flash, bytes", "RAM, bytes", "instructions, Cortex-M0", "Cortex-M4F"
 
 
 def _cells(boards):
-    """Sizes on the smallest board that has room, and the instructions of a call on each."""
+    """Return the sizes on the smallest board that has room, and a call's instructions on each."""
     sizes = boards["cortex-m0"] or boards["cortex-m4"]
     calls = [f"{cost['instructions']:,}" if cost else "too large" for cost in boards.values()]
     return [f"{sizes['flash']:,}", f"{sizes['ram']:,}", *calls]

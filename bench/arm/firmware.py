@@ -95,6 +95,6 @@ def _compiled(firmware, board, folder):
 
 
 def _sizes(program):
-    """Bytes of flash and of static memory."""
+    """Return a program's bytes of flash and of static memory."""
     text, data, bss = map(int, run("arm-none-eabi-size", program).split(b"\n")[1].split()[:3])
     return text + data, data + bss

@@ -44,7 +44,7 @@ N_RESAMPLES = 10_000
 
 
 def keys():
-    """Keys, those of the slow model last."""
+    """Return all keys, those of the slow model last."""
     unsorted = [
         (problem, model, fold)
         for fold in range(real.N_FOLDS)
@@ -57,7 +57,7 @@ def keys():
 
 
 def rank_column(middles, models):
-    """Mean ranks by model, with intervals of 95 % from resampled problems."""
+    """Return mean ranks by model, with 95 % intervals from resampled problems."""
     ranks = rankdata(-middles, axis=1)
     random = np.random.RandomState(0)
     drawn = random.randint(len(ranks), size=(N_RESAMPLES, len(ranks)))
@@ -68,7 +68,7 @@ def rank_column(middles, models):
 
 
 def columns_of(title, middles, models):
-    """Ranks on all problems of the models that have them, and of all models on the others."""
+    """Return ranks on all problems of models that have them, and of all models on the others."""
     names, there = np.array(models), np.isfinite(middles)
     everywhere = there.all(axis=0)
     columns = {f"{title}, rank": rank_column(middles[:, everywhere], names[everywhere])}
@@ -79,7 +79,7 @@ def columns_of(title, middles, models):
 
 
 def mean_column(results, what):
-    """Mean over classifications of a figure of probabilities."""
+    """Return the mean over classifications of a measure of probabilities, by model."""
     middles = problems.middles_of(results, CLASSIFICATION_APART, CLASSIFIERS, what, np.mean)
     return {m: f"{x:.3f}" for m, x in zip(CLASSIFIERS, middles.mean(axis=0), strict=True)}
 

@@ -135,7 +135,7 @@ def scaled(model):
 
 
 def tuned(model, grid):
-    """The model with the best of a grid by cross-validation, refitted on everything."""
+    """Return the model with the best of a grid by cross-validation, refitted on everything."""
     return GridSearchCV(model, grid, cv=INNER_FOLDS) if grid else model
 
 
@@ -188,7 +188,7 @@ def regressors(n_inputs, noisy, seed):
 
 
 def classifiers(seed):
-    """Name to (model, grid)."""
+    """Return (model, grid) by name."""
     return {
         "SDNN (ours)": (
             SDNNClassifier(random_state=seed),

@@ -103,7 +103,7 @@ MEASURED = [p for p in real_data.CLASSIFICATION if (p, "CatBoost") not in real.L
 
 
 def fold_of(problem, splitter, fold):
-    """Measured inputs and targets to learn, and to test, as real.py has them."""
+    """Return measured inputs and targets to learn and to test, as real.py has them."""
     X, y = real_data.samples(problem)
     folds = splitter(real.N_FOLDS, shuffle=True, random_state=0).split(X, y)
     train, test = list(folds)[fold]
@@ -111,7 +111,7 @@ def fold_of(problem, splitter, fold):
 
 
 def measure_intervals(problem, name, seed):
-    """Share of targets inside; mean width and interval score in standard deviations of targets."""
+    """Return the share of targets inside; width and score in standard deviations of targets."""
     is_made = problem in problems.REGRESSION
     X, X_test, y, y_test = (
         problems.samples(problem, seed) if is_made else fold_of(problem, KFold, seed)
@@ -130,7 +130,7 @@ def measure_intervals(problem, name, seed):
 
 
 def measure_stream(stream, seed):
-    """Share of a stream's targets inside the intervals, of all and of each eighth."""
+    """Return the share of a stream's targets inside the intervals, of all and of each eighth."""
     model, inside = ours(seed), []
     for x, y in zip(*stream_data.samples(stream, seed), strict=True):
         bounds = model.predict_one(x, with_interval=True)
@@ -154,7 +154,7 @@ def class_samples(problem, seed):
 
 
 def measure_probabilities(problem, name, seed):
-    """Accuracy, log loss, calibration error and processor seconds to fit."""
+    """Return accuracy, log loss, calibration error and processor seconds to fit."""
     X, X_test, y, y_test = class_samples(problem, seed)
     make = PROBABILITIES[name]
     if problem in MEASURED:
@@ -177,7 +177,7 @@ def measure_probabilities(problem, name, seed):
 
 
 def grouped(kind, folder):
-    """Rows of all seeds by problem, and model if there are several."""
+    """Return the rows of all seeds by problem, and by model if there are several."""
     results = defaultdict(list)
     for key, row in measured(kind, folder).items():
         results[key[:-1]].append(row)
@@ -191,7 +191,7 @@ def mean(rows, what):
 
 
 def interval_table(results):
-    """Mean coverage of the problems, its range, those near .9, and mean width and score."""
+    """Return mean, range and number near 0.9 of coverage; mean width and score."""
     rows = []
     for name in INTERVALS:
         covered = np.array([mean(results[problem, name], "coverage") for problem in REGRESSION])
@@ -207,7 +207,7 @@ def interval_table(results):
 
 
 def all_intervals(results):
-    """Coverage of each problem."""
+    """Return the coverage of each problem."""
     rows = [
         (p, *(f"{mean(results[p, name], 'coverage'):.3f}" for name in INTERVALS))
         for p in REGRESSION
@@ -216,7 +216,7 @@ def all_intervals(results):
 
 
 def stream_table(results):
-    """Coverage of each stream, and of its worst eighth."""
+    """Return the coverage of each stream, and of its worst eighth."""
     rows, covered = [], []
     for stream in STREAMS:
         of_seeds = results[stream,]
@@ -229,7 +229,7 @@ def stream_table(results):
 
 
 def probability_table(results, of_real):
-    """Log loss, calibration error and time, means over problems, and of the large one."""
+    """Return means of log loss and calibration error over problems, and those of the large one."""
     rows = []
     for name in PROBABILITIES:
         made = [results[problem, name] for problem in problems.CLASSIFICATION]

@@ -42,7 +42,7 @@ USELESS = (0, 2, 4, 8)
 
 
 def ours(n_units, max_iter, seed):
-    """LIBSDNN's setting, and longer codes with the same share of flips."""
+    """Make a model with LIBSDNN's setting, or longer codes with the same share of flips."""
     coding = RandomInverse(n_bins=1001, n_flipped=round(5 * n_units / 2000), low=0.0, high=1.0)
     return SDNNRegressor(
         coding,
@@ -67,7 +67,7 @@ def chosen(model):
 
 
 def timed_fit(model, X, y):
-    """The fitted model, and what every measurement of it says."""
+    """Return the fitted model, and the entries that every measurement of it has."""
     begin = time.process_time()
     model = model.fit(X, y)
     return model, {"train": round(time.process_time() - begin, 2), "chosen": chosen(model)}
@@ -103,7 +103,7 @@ def useless_keys(n_seeds):
 
 
 def useless(name, n_useless, seed):
-    """The demonstration problem with inputs that say nothing; a new sample per seed."""
+    """Measure the demonstration problem with irrelevant inputs; a new sample for each seed."""
     random = np.random.RandomState(1000 + seed)
     train, test = training_points(1000, seed), training_points(4000, 500 + seed)
     noise, test_noise = random.uniform(size=(1000, 8)), random.uniform(size=(4000, 8))
@@ -132,7 +132,7 @@ def real_keys():
 
 
 def real(data, name, repeat, fold):
-    """Two data sets of scikit-learn, nested cross-validation: 5 folds outside, 3 inside."""
+    """Measure data of scikit-learn by nested cross-validation: 5 folds outside, 3 inside."""
     loader, splitter = REAL[data]
     X, y = loader(return_X_y=True)
     folds = splitter(n_splits=N_FOLDS, n_repeats=N_REPEATS, random_state=0).split(X, y)
@@ -146,12 +146,12 @@ LOW, STEP, N_UNITS, N_EPOCHS, N_CODES = -0.2, 0.005, 280, 300, 20
 
 
 def bins(points):
-    """Points are multiples of 0.001."""
+    """Return the bins of points, which are multiples of 0.001."""
     return np.rint(1000 * points).astype(np.int32)
 
 
 def seeds(n_pattern_units, seed):
-    """A training sample and a code of its own for each seed; processor seconds, on one core."""
+    """Measure a network with the sample and the code of a seed, and its processor seconds."""
     points = training_points(N_TRAINING, seed)
     n_flipped = round(5 * n_pattern_units / 2000)  # r / n as in LIBSDNN's setting
     tables = [
@@ -181,7 +181,7 @@ def seeds(n_pattern_units, seed):
 
 
 def grouped(kind, folder, n_words):
-    """Measurements by the first words of their keys."""
+    """Return measurements by the first words of their keys."""
     results = defaultdict(list)
     for key, row in measured(kind, folder).items():
         results[key[:n_words]].append(row)
@@ -207,7 +207,7 @@ def useless_table(results):
 
 
 def real_tables(results):
-    """Means over folds; 95 % intervals with Nadeau and Bengio's correction for shared samples."""
+    """Yield tables of means over folds; intervals have Nadeau and Bengio's correction."""
     for data in REAL:
         rows = []
         for (where, name), group in results.items():

@@ -27,7 +27,7 @@ mpl.rcParams["font.size"] = 9
 
 
 def demonstration_figure(model):
-    """Target with the sample, prediction, and error."""
+    """Draw the target with the sample, the prediction, and the error."""
     points = lattice()
     X = training_points(N_TRAINING, seed=0)
     predicted = model.fit(X, target(X)).predict(points)
@@ -60,7 +60,7 @@ def demonstration_figure(model):
 
 
 def kernel_figure():
-    """Correlations with the middle bin, for three codings of numbers."""
+    """Draw correlations with the middle bin, for three codings of numbers."""
     figure = Figure(figsize=(8.4, 2.9), layout="constrained")
     codings = (
         ("random-inverse, length scale 0.1", RandomInverse(length_scale=0.1), 0.5),
@@ -81,7 +81,7 @@ def kernel_figure():
 
 
 def useless_figure(rows):
-    """Error against the number of useless inputs; single seeds as dots, means as lines."""
+    """Draw error against the number of irrelevant inputs: seeds as dots, means as lines."""
     results = defaultdict(lambda: defaultdict(list))
     for (system, n_useless, _), row in rows.items():
         results[system][n_useless].append(row["rmse"])

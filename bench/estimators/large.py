@@ -49,12 +49,12 @@ SLOW = ("SDNN kernel ridge", "CatBoost")
 
 
 def friedman(random, n):
-    """Friedman's first problem: five of ten inputs are useless."""
+    """Draw Friedman's first problem: five of ten inputs are irrelevant."""
     return make_friedman1(n, n_features=10, noise=1.0, random_state=random)
 
 
 def ten_inputs(random, n):
-    """Waves of ten inputs and products of neighbours, each three quarters as high as the last."""
+    """Draw waves of ten inputs and products of neighbours, each 3/4 as high as the last."""
     X = random.uniform(size=(n, 10))
     y = 0.15 * random.normal(size=n)
     for k in range(10):
@@ -113,7 +113,7 @@ def keys(n_seeds):
 
 
 def middles(results, problem, model, what, to=None):
-    """Medians over seeds of a figure for each size, or of its ratio to that of another model."""
+    """Return medians over seeds of a measure for each size, or of its ratio to another model's."""
     rows = [[r for (p, n, _), r in results.items() if (p, n) == (problem, size)] for size in SIZES]
     return np.array(
         [
@@ -124,7 +124,7 @@ def middles(results, problem, model, what, to=None):
 
 
 def fit_table(results, problem):
-    """R2, ratios of fitting times to gradient boosting's, and the exponent from 10,000 rows on."""
+    """Return R2, fitting times over gradient boosting's, and their exponent from 10,000 rows on."""
     sizes = [f"{size:,}" for size in SIZES]
     header = ("model", *(f"R2, {n}" for n in sizes), *(f"fit, {n}" for n in sizes), "exponent")
     rows = []
@@ -139,7 +139,7 @@ def fit_table(results, problem):
 
 
 def prediction_table(results):
-    """Ratios of prediction times, one row to linear regression's and many to LightGBM's."""
+    """Return ratios of prediction times: one row to linear regression's, many to LightGBM's."""
     header = ["model"]
     for problem in PROBLEMS:
         for what in ("one row", "many"):

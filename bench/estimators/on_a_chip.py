@@ -29,27 +29,27 @@ N_PREDICTED, N_LEARNED = 10_000, 5000
 
 
 def friedman(random):
-    """Friedman's first problem without its fifth input, with its noise."""
+    """Draw Friedman's first problem without its fifth input, with its noise."""
     X = random.uniform(size=(N_SAMPLES, 4))
     y = 10 * np.sin(np.pi * X[:, 0] * X[:, 1]) + 20 * (X[:, 2] - 0.5) ** 2 + 10 * X[:, 3]
     return X, y + random.normal(size=N_SAMPLES)
 
 
 def compactness(_):
-    """The mean compactness of cells, from radius, texture, smoothness and concavity."""
+    """Return the mean compactness of cells, from radius, texture, smoothness and concavity."""
     data = load_breast_cancer().data
     return data[:, [0, 1, 4, 6]], data[:, 5]
 
 
 def approval(_):
-    """The approval of a president by all polls, from those of four pollsters."""
+    """Return the approval of a president by all polls, from those of four pollsters."""
     rows = list(TrumpApproval())
     names = sorted(rows[0][0])[1:5]
     return np.array([[x[name] for name in names] for x, _ in rows]), np.array([y for _, y in rows])
 
 
 def gas_sensor(random):
-    """A gas, from a voltage that depends on temperature and humidity, and on the sensor's age."""
+    """Draw a gas's share, and a sensor's voltage with temperature, humidity and age as inputs."""
     low, high = (0, -10, 0, 0), (1000, 50, 100, 1)
     gas, temperature, humidity, age = random.uniform(low, high, (N_SAMPLES, 4)).T
     voltage = (0.5 + 2.5 * np.sqrt(gas / 1000)) * (1 + 0.006 * (temperature - 20))
@@ -58,7 +58,7 @@ def gas_sensor(random):
 
 
 def pendulum(random):
-    """The acceleration of a pendulum, from cosine and sine of its angle, speed and torque."""
+    """Draw the acceleration of a pendulum, from cosine and sine of its angle, speed and torque."""
     angle, speed, torque = random.uniform((-np.pi, -8, -2), (np.pi, 8, 2), (N_SAMPLES, 3)).T
     acceleration = 15 * np.sin(angle) + 3 * torque - 0.1 * speed * abs(speed)
     return np.stack([np.cos(angle), np.sin(angle), speed, torque], axis=1), acceleration
@@ -74,7 +74,7 @@ DATA = {
 
 
 def score(settings, X, y):
-    """Mean R2 over four folds and all seeds."""
+    """Return the mean R2 over four folds and all seeds."""
     return np.mean([
         cross_val_score(
             SDNNRegressor(**settings, random_state=seed),
@@ -87,14 +87,14 @@ def score(settings, X, y):
 
 
 def written_in_c(model, source, rows, learning):
-    """The bytes that a program with the model's header writes."""
+    """Return the bytes that a program with the model's header writes."""
     with tempfile.TemporaryDirectory() as temporary:
         export_estimator_header(model, Path(temporary) / "model.h", learning=learning)
         return run(*compiled(Path(temporary), source, TARGETS["x86-64"]), input=rows.tobytes())
 
 
 def differing(X, y):
-    """Numbers of predictions and of weights that have other bits in C."""
+    """Return the numbers of predictions and of weights that have other bits in C."""
     random = np.random.default_rng(1)
     model = SDNNRegressor(**small_settings(N_INPUTS), random_state=0).fit(X, y)
     samples = random.uniform(X.min(axis=0), X.max(axis=0), (N_PREDICTED, N_INPUTS))

@@ -73,7 +73,7 @@ def uniform(random, n, n_inputs):
 
 
 def made(maker, **options):
-    """A maker of scikit-learn, whose function may depend on the seed."""
+    """Return a maker of scikit-learn, whose function may depend on the seed."""
     return lambda random, n: maker(n, random_state=random, **options)
 
 
@@ -108,7 +108,7 @@ def sparse_plane(random, n):
 
 
 def reach_of_arm(random, n):
-    """How far the hand of a planar arm of three joints is from a point; two inputs are useless."""
+    """Return how far the hand of a planar arm of three joints is from a point."""
     X = uniform(random, n, 5)
     angles = np.cumsum(np.pi * X[:, :3], axis=1)
     hand = np.stack([np.cos(angles).sum(axis=1), np.sin(angles).sum(axis=1)])
@@ -116,7 +116,7 @@ def reach_of_arm(random, n):
 
 
 def hour_and_place(random, n):
-    """Demand by hour and by one of eight places, each with an hour of its own, as plain numbers."""
+    """Return demand by hour and place as plain numbers; each of eight places has a peak hour."""
     hour, place = random.uniform(0, 24, n), random.randint(8, size=n)
     peak = np.array([8, 17, 12, 3, 21, 9, 15, 19])[place]
     y = np.cos(2 * np.pi * (hour - peak) / 24) + 0.2 * random.normal(size=n)
@@ -139,7 +139,7 @@ def rings(random, n):
 
 
 def of_data(loader):
-    """Data that are there, all or a part of them; the seed decides which are for the test."""
+    """Return measured data, at most `MOST_MEASURED` rows; the seed decides which are tested."""
     X, y = loader()
 
     def samples(random, n):
@@ -198,7 +198,7 @@ PROBLEMS = REGRESSION | CLASSIFICATION
 
 
 def short(n_inputs):
-    """Units per pattern that make 4,000 columns, a quarter of what the default makes."""
+    """Return the units per pattern that make 4,000 columns, a quarter of the default's."""
     n_pairs = min(n_inputs * (n_inputs - 1), 500)
     return max(2, 4000 // n_pairs // 2 * 2)
 
@@ -259,7 +259,7 @@ TABLES = {"R2": (REGRESSION, REGRESSORS), "accuracy": (CLASSIFICATION, CLASSIFIE
 
 @lru_cache(1)
 def samples(problem, seed):
-    """Training and test samples: X, X_test, y, y_test."""
+    """Return training and test samples: X, X_test, y, y_test."""
     random = np.random.RandomState(seed)
     make = PROBLEMS[problem]
     X, y = make(random, N_TRAINING + N_TEST)
@@ -269,7 +269,7 @@ def samples(problem, seed):
 
 
 def coverage(model, X, y):
-    """The share of targets within 1.645 standard deviations of the mean of the epochs' answers."""
+    """Return the share of targets within 1.645 standard deviations of the mean over epochs."""
     mean, deviation = model.predict(X, return_std=True)
     return round(float(np.mean(np.abs(y - mean) <= 1.645 * deviation)), 4)
 
@@ -304,14 +304,14 @@ def scores(results, problem, model, what="score"):
 
 
 def ranks(middles):
-    """Mean rank of each model over problems, shape (n_problems, n_models); 1 is the best."""
+    """Return each model's mean rank from scores (n_problems, n_models); 1 is the best."""
     better = (middles[:, None, :] > middles[:, :, None]).sum(axis=2)
     equal = (middles[:, None, :] == middles[:, :, None]).sum(axis=2)
     return (better + (equal + 1) / 2).mean(axis=0)
 
 
 def middles_of(results, problems, models, what="score", middle=np.median):
-    """Medians or means of a score, shape (n_problems, n_models); NaN where there is none."""
+    """Return medians or means of a score, (n_problems, n_models); NaN where there is none."""
     return np.array(
         [
             [
@@ -324,7 +324,7 @@ def middles_of(results, problems, models, what="score", middle=np.median):
 
 
 def table(problems, models, middles, shown=None):
-    """A row of scores for each problem, with columns of the shown models only; best in bold."""
+    """Return scores, a row for each problem and a column for each shown model; best in bold."""
     columns = [place for place, model in enumerate(models) if shown is None or model in shown]
     rows = []
     for problem, row in zip(problems, middles, strict=True):
@@ -341,7 +341,7 @@ def _score_cell(score, best):
 
 
 def rank_columns(title, models, middles):
-    """Mean ranks by model, of those that were measured on all problems; and on such problems."""
+    """Return mean ranks of models measured on all problems, and of all models on such problems."""
     is_ranked = np.array([model not in VARIANTS for model in models])
     is_measured = np.isfinite(middles)
     measured_on_all = is_measured.all(axis=0)
@@ -353,14 +353,14 @@ def rank_columns(title, models, middles):
 
 
 def rank_column(models, middles, is_ranked):
-    """Mean ranks of some models among themselves."""
+    """Return mean ranks of some models among themselves."""
     names = [model for model, ranked in zip(models, is_ranked, strict=True) if ranked]
     results = ranks(middles[:, is_ranked])
     return {name: f"{rank:.1f}" for name, rank in zip(names, results, strict=True)}
 
 
 def fit_column(results, problems, models):
-    """Median seconds of fitting by model."""
+    """Return the median seconds of fitting by model."""
     return {
         model: f"{np.median([row['fit_s'] for p in problems for row in results[p, model]]):.2g}"
         for model in models
@@ -368,14 +368,14 @@ def fit_column(results, problems, models):
 
 
 def by_model(columns):
-    """A table with a row for each model, from columns by model."""
+    """Return a table with a row for each model, from columns by model."""
     models = dict.fromkeys(model for column in columns.values() for model in column)
     rows = [(model, *(column.get(model, "") for column in columns.values())) for model in models]
     return markdown(("model", *columns), rows)
 
 
 def draw(results, path):
-    """A dot for each model and problem at the median, a bar over the middle 80 % of seeds."""
+    """Draw a dot for each model and problem at the median, a bar over the middle 80 % of seeds."""
     figure = Figure(figsize=(10, 6.4), layout="constrained")
     colors = {
         "SDNN": "#1f5fa8", "SDNN kernel ridge": "#6fa8dc", "SDNN, last epoch": "#0b2f57",

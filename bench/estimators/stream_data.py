@@ -43,7 +43,7 @@ LED_OPTIONS = {"noise_percentage": 0.1, "irrelevant_features": True}
 
 
 def wave(seed):
-    """A wave over three inputs, one of them useless, that turns and becomes shorter."""
+    """Draw a wave over three inputs, one of them irrelevant, that turns and becomes shorter."""
     random = np.random.RandomState(seed)
     for number in range(N_SAMPLES):
         a, b, c = random.uniform(-1, 1, 3)
@@ -60,7 +60,7 @@ def drifting_friedman(kind, n_changes=2):
 
 
 def in_turn(make, option, values, **options):
-    """A generator with another value of an option in each third."""
+    """Make a generator with another value of an option in each third."""
 
     def stream(seed):
         for third, value in enumerate(values):
@@ -76,7 +76,7 @@ def functions(make, *values):
 
 
 def table(package, item, target, *dropped):
-    """Rows of a table, as river has them."""
+    """Return the rows of a table, as river has them."""
 
     def stream(_seed):
         rows = usable(table_of(package, item).head(N_SHORT), target, dropped)
@@ -155,7 +155,7 @@ def samples(name, seed):
 
 
 def of_river():
-    """Names of river's data and generators that the rule gives."""
+    """Return the names of river's data and generators that the rule gives."""
     for module, kind in ((datasets, base.FileDataset), (synth, base.SyntheticDataset)):
         for name, make in inspect.getmembers(module, inspect.isclass):
             if not issubclass(make, kind) or issubclass(make, base.RemoteDataset):
@@ -169,7 +169,7 @@ def of_river():
 
 
 def of_tables():
-    """Names of the tables that the rule gives."""
+    """Return the names of the tables that the rule gives."""
     for package in PACKAGES:
         for item in items(package):
             rows = table_of(package, item)

@@ -128,7 +128,7 @@ CLASSIFIERS = {
 
 
 def measure(stream, name, seed):
-    """R2 or accuracy, the errors of windows, and microseconds of processor time a sample."""
+    """Return R2 or accuracy, the errors of windows, and processor microseconds a sample."""
     make = (REGRESSORS if stream in REGRESSION else CLASSIFIERS)[name]
     return follow(make(seed), stream, *samples(stream, seed))
 
@@ -158,7 +158,7 @@ def follow(model, stream, xs, ys):
 
 
 def complete(rows, regressors=REGRESSORS, classifiers=CLASSIFIERS):
-    """Rows by stream and model, of the seeds that all models of a stream have."""
+    """Return rows by stream and model, of the seeds that all models of a stream have."""
     of_seeds = defaultdict(dict)
     for (stream, model, seed), row in rows.items():
         of_seeds[stream, seed][model] = row
@@ -171,7 +171,7 @@ def complete(rows, regressors=REGRESSORS, classifiers=CLASSIFIERS):
 
 
 def score(rows):
-    """Median of seeds."""
+    """Return the median of R2 or accuracy over seeds."""
     return float(np.median([row.get("r2", row.get("accuracy")) for row in rows]))
 
 
@@ -181,7 +181,7 @@ def score_text(value):
 
 
 def places(results, data, models):
-    """Ranks of each model, one for each stream; a variant is ranked in SDNN's place."""
+    """Return the ranks of each model, one for each stream; a variant is ranked in SDNN's place."""
     others = [name for name in models if not name.startswith("SDNN")]
     ranks = {}
     # SDNN itself comes last, so that the ranks of the others are those beside it.
@@ -193,7 +193,7 @@ def places(results, data, models):
 
 
 def by_model(results, data, models, most, timed):
-    """Ranks of each model and its time on one stream, measured on one machine.
+    """Return the ranks of each model and its time on one stream, measured on one machine.
 
     Counted is in how many streams a model is among the first `most`.
     """
@@ -207,7 +207,7 @@ def by_model(results, data, models, most, timed):
 
 
 def by_stream(results, data, models):
-    """All scores."""
+    """Return all scores, a row for each stream."""
     rows = [
         (
             stream,

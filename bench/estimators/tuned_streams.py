@@ -35,7 +35,7 @@ from streams import (
 
 
 def nearest(make):
-    """A maker of nearest neighbours among the last samples."""
+    """Return a maker of nearest neighbours among the last samples."""
 
     def model(seed, n_neighbors, window):
         engine = neighbors.LazySearch(window_size=window)
@@ -45,7 +45,7 @@ def nearest(make):
 
 
 def patches(seed, leaf_prediction, subspace_size=0.6):
-    """Random patches of scaled inputs, as linear leaves diverge without."""
+    """Make random patches of scaled inputs, as linear leaves diverge without scaling."""
     base = tree.HoeffdingTreeRegressor(grace_period=50, leaf_prediction=leaf_prediction)
     return scaled(ensemble.SRPRegressor(base, subspace_size=subspace_size, seed=seed))
 

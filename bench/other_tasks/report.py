@@ -28,19 +28,19 @@ Trials = Sequence[Mapping[str, Any]]
 
 
 def returns_after(trials: Trials, steps: int) -> NDArray[np.float64]:
-    """Mean returns of the evaluations after so many steps, shape (n_trials,); NaN where none is."""
+    """Return mean returns of the evaluations after some steps, (n_trials,); NaN where none is."""
     return np.array(
         [dict(zip(t["steps"], t["mean_return"], strict=True)).get(steps, np.nan) for t in trials]
     )
 
 
 def last_returns(trials: Trials) -> NDArray[np.float64]:
-    """Mean returns at the end, shape (n_trials,)."""
+    """Return the mean returns at the end, shape (n_trials,)."""
     return np.array([trial["mean_return"][-1] for trial in trials])
 
 
 def score(case: str, trials: Trials) -> float:
-    """Median return at the end: 0 is that of random actions, 1 solves the task."""
+    """Return the median return at the end: 0 is that of random actions, 1 solves the task."""
     task = TASKS.get(case) or TASKS[parts_of(case)[0]]
     value: float = task.score(np.median(last_returns(trials)))
     return value
@@ -95,14 +95,14 @@ def _end_table(
 def _ours_rows(
     results: Curves, tasks: Sequence[str], changes: Iterable[str]
 ) -> Iterator[list[str]]:
-    """Our medians under each change, a column for each task."""
+    """Yield our medians under each change, a column for each task."""
     for change in changes:
         trials = [results.get((f"{task} {change}", OURS), ()) for task in tasks]
         yield [change, *(number(np.median(last_returns(t))) if t else "" for t in trials)]
 
 
 def _cost_rows(study: Study, results: Curves) -> Iterator[Sequence[str]]:
-    """Medians of each agent over the cases."""
+    """Yield medians of each agent over the cases."""
     for variant in study.variants:
         cases = [trials for (_, name), trials in results.items() if name == variant.id]
         if cases:

@@ -118,7 +118,7 @@ class Network:
 
 
 def _before_unit(slopes, normalized, deviation):
-    """Slopes of a layer's sums, given those of its leaky units."""
+    """Return slopes of a layer's sums, given those of its leaky units."""
     slopes = np.where(normalized > 0, slopes, SLOPE * slopes)
     along = float(slopes @ normalized) / slopes.size
     return (slopes - slopes.mean() - normalized * along) / deviation

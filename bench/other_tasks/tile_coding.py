@@ -97,7 +97,7 @@ MOST_BYTES = 2**30
 
 
 def listed_actions(space):
-    """All actions of a space; a Box's with 5 values in each dimension, 3 in each of many."""
+    """Return all actions of a space; a Box's with 5 values in each dimension, 3 in each of many."""
     if not isinstance(space, gym.spaces.Box):
         return list(range(space.n))
     n_values = N_VALUES if space.shape[0] <= MOST_DIMENSIONS else N_VALUES_OF_MANY
@@ -179,7 +179,7 @@ class TileCodingSarsa:
         return self.n_numbers * self.weights.nbytes
 
     def tiles(self, observation):
-        """The active tiles of an observation."""
+        """Return the active tiles of an observation."""
         if isinstance(self._code, Table):
             return self._code(observation)
         unit = (observation - self._low) / (self._high - self._low)
@@ -188,7 +188,7 @@ class TileCodingSarsa:
         return self._code(unit)
 
     def values(self, tiles):
-        """Q of every action."""
+        """Return Q of every action."""
         return self.weights[:, tiles].sum(axis=1)
 
     def begin_episode(self) -> None:
