@@ -210,8 +210,10 @@ def train_run(
         click.echo(json_text({"folder": str(run.folder), **facts}))
         return
     report = outcome.learning_report
-    is_improvable = report is not None and not outcome.is_solved
-    too_wide, too_narrow = _unsuitable_ranges(report) if is_improvable else ([], [])
+    too_wide: list[int] = []
+    too_narrow: list[int] = []
+    if report is not None and not outcome.is_solved:  # a solved task needs no other ranges
+        too_wide, too_narrow = _unsuitable_ranges(report)
     text = rendered(
         "outcome.txt.jinja",
         run=run,

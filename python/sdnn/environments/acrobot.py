@@ -104,8 +104,8 @@ class AcrobotSwingUpEnv(gym.Env[Array, ArrayLike]):
         self.render_mode = render_mode
         self._acrobot = _core.Acrobot(self.config)
         self._was_reset = self._success = False
-        self._tolerance = self.goal_tolerance
-        self._torque = 0.0
+        self._tolerance = self.goal_tolerance  # that of this episode; the attribute's is the next
+        self._torque = 0.0  # N m, the last one held
         self._picture: AcrobotPicture | None = None
         self._pictures: list[RenderFrame] = []
         self._motion: AcrobotMotion | None = None

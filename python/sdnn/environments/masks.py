@@ -1,4 +1,4 @@
-"""Environments that tell which actions are allowed."""
+"""Environments that report which actions are allowed."""
 
 from __future__ import annotations
 
@@ -58,4 +58,5 @@ class ActionMasks(gym.Wrapper[Element, Element, Element, Element], gym.utils.Rec
         return (*outcome, self._with_mask(info))
 
     def _with_mask(self, info: Data) -> Data:
+        """Return an info with the mask of the present state, or as it is without a function."""
         return info if self._mask is None else {**info, "action_mask": self._mask(self.unwrapped)}

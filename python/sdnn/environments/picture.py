@@ -30,7 +30,7 @@ _LINK_1 = (44, 92, 138)
 _LINK_2 = (92, 152, 199)
 _TORQUE = (224, 122, 47)
 _FULL_TORQUE_ARC = 1.5 * math.pi  # the arc of the largest torque
-_LONGEST = 0.04  # longest seconds between pictures of a smooth movement
+_LONGEST = 0.04  # longest seconds between pictures of a smooth movement: 25 a second; chosen
 
 
 class AcrobotMotion:
@@ -42,10 +42,11 @@ class AcrobotMotion:
     def __init__(self, config: AcrobotConfig) -> None:
         n_steps = round(config.decision_interval / config.integration_step)
         # A quotient that rounding left just below a whole number counts as that number.
-        most_joined = max(1, int(_LONGEST / config.integration_step * (1.0 + 1e-9)))
-        n_joined = next(n for n in range(min(most_joined, n_steps), 0, -1) if n_steps % n == 0)
-        self.interval = n_joined * config.integration_step
-        self._n_intervals = n_steps // n_joined
+        most_steps = max(1, int(_LONGEST / config.integration_step * (1.0 + 1e-9)))
+        # The most integration steps between two pictures that divide those of a decision.
+        steps_between = next(n for n in range(min(most_steps, n_steps), 0, -1) if n_steps % n == 0)
+        self.interval = steps_between * config.integration_step
+        self._n_intervals = n_steps // steps_between
         config_between = dataclasses.replace(
             config, decision_interval=self.interval, max_decisions=self._n_intervals
         )
@@ -58,7 +59,9 @@ class AcrobotMotion:
         """Yield the states, shape (4,), after ``state`` until the next decision or the goal."""
         self._acrobot.set_state(state)
         for _ in range(self._n_intervals - 1):
-            _, reached, _ = self._acrobot.step(torque, goal_tolerance * self._tests_goal)
+            # At a tolerance of 0 no speed is low enough for the goal.
+            tolerance = goal_tolerance if self._tests_goal else 0.0
+            _, reached, _ = self._acrobot.step(torque, tolerance)
             if reached:
                 return
             yield self._acrobot.state()
@@ -100,9 +103,11 @@ class AcrobotPicture:
         whether the goal is reached, which is written.
         """
         pygame = self._pygame
-        hanging = state[0] - math.pi / 2, state[0] + state[1] - math.pi / 2
-        elbow = cmath.rect(self._config.link_length_1, hanging[0])
-        tip = elbow + cmath.rect(self._config.link_length_2, hanging[1])
+        # Angles from the horizontal: a link at theta = 0 hangs down, and theta2 is relative.
+        angle_1 = state[0] - math.pi / 2
+        angle_2 = angle_1 + state[1]
+        elbow = cmath.rect(self._config.link_length_1, angle_1)
+        tip = elbow + cmath.rect(self._config.link_length_2, angle_2)
         self._canvas.fill(_PAPER)
         self._draw_background(solved)
         self._draw_link(0j, elbow, _LINK_1)
@@ -134,6 +139,7 @@ class AcrobotPicture:
     # Points are complex numbers, in m from joint 1.
 
     def _pixel(self, point: complex) -> tuple[float, float]:
+        """Return the pixel of a point on the canvas, whose y axis points down."""
         middle = _SIZE * _FINE / 2
         return middle + self._scale * point.real, middle - self._scale * point.imag
 

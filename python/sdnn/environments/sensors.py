@@ -26,7 +26,7 @@ STREAMS: dict[str, _core.Stream] = {
 }
 """The core's random streams of noise, by name."""
 
-_NAMED: dict[str, SensorFunction] = {
+_NAMED_FUNCTIONS: dict[str, SensorFunction] = {
     "energy": lambda s: _core.energy_sensor(s[2], s[3]),
     "height": lambda s: _core.height_sensor(s[0], s[1]),
 }
@@ -79,8 +79,8 @@ class UnitSensors(_Sensors):
         observation_high: ArrayLike | None = None,
     ) -> None:
         super().__init__(env, observation_low=observation_low, observation_high=observation_high)
-        self.observation_low = _ends("observation_low", observation_low, self._space.low)
-        self.observation_high = _ends("observation_high", observation_high, self._space.high)
+        self.observation_low = _limits("observation_low", observation_low, self._space.low)
+        self.observation_high = _limits("observation_high", observation_high, self._space.high)
         if not (self.observation_low < self.observation_high).all():
             raise ValueError(
                 "observation_low must be below observation_high,"
@@ -125,7 +125,7 @@ class RedundantSensors(_Sensors):
         super().__init__(env, functions=functions, bounds=bounds)
         self.functions = tuple(functions)
         self._functions = tuple(
-            function if callable(function) else choice("functions", function, _NAMED)
+            function if callable(function) else choice("functions", function, _NAMED_FUNCTIONS)
             for function in functions
         )
         n = len(self._functions)
@@ -146,7 +146,7 @@ class RedundantSensors(_Sensors):
 
 
 class _RandomSensors(_Sensors):
-    """Sensors with a random stream of their own, which ``_restart(seed)`` starts."""
+    """Sensors with a dedicated random stream, which ``_restart(seed)`` starts."""
 
     def __init__(self, env: Env, *, seed: int, stream: str, **arguments: Any) -> None:
         super().__init__(env, seed=seed, stream=stream, **arguments)
@@ -204,9 +204,9 @@ class NoisySensors(_RandomSensors):
         (n_channels,) = self._space.shape
         if not (np.all(self._space.low >= 0.0) and np.all(self._space.high <= 1.0)):
             raise ValueError("the observation space must lie within [0, 1] in every channel")
-        # Sensors of the acrobot: its first two readings are angles.
-        edges = (["wrap"] * 2 + ["saturate"] * n_channels)[:n_channels]
-        if edge is not None:
+        if edge is None:  # as for the acrobot, whose first two readings are angles
+            edges: list[str] = ["wrap" if i < 2 else "saturate" for i in range(n_channels)]
+        else:
             edges = [edge] * n_channels if isinstance(edge, str) else list(edge)
         if len(edges) != n_channels:
             raise ValueError(f"edge must have {n_channels} entries, got {len(edges)}")
@@ -269,20 +269,23 @@ def _float_of(observation: Observation) -> np.dtype[Any]:
     return dtype if dtype.kind == "f" else np.dtype(np.float32)
 
 
-def _ends(name: str, given: ArrayLike | None, bounds: Array) -> NDArray[np.float64]:
-    """Return the lower or upper limits of all ranges, as given or from the space, shape (l,)."""
-    numbers = bounds if given is None else array_of(name, given)
-    ends = with_infinities(numbers.astype(np.float64))
+def _limits(name: str, argument: ArrayLike | None, bounds: Array) -> NDArray[np.float64]:
+    """Return the lower or upper limits of all ranges: the argument, or the space's, shape (l,).
+
+    ValueError unless all are finite.
+    """
+    numbers = bounds if argument is None else array_of(name, argument)
+    limits = with_infinities(numbers.astype(np.float64))
     expected = f"have {bounds.size} numbers, one per observed variable"
-    require(ends.shape == bounds.shape, name, expected, given)
-    unbounded = np.flatnonzero(~np.isfinite(ends))
+    require(limits.shape == bounds.shape, name, expected, argument)
+    unbounded = np.flatnonzero(~np.isfinite(limits))
     if unbounded.size:
         raise ValueError(
             f"{name} must be given where observations are unbounded (variables"
             f" {', '.join(map(str, unbounded))} of {bounds.size}, from 0): one finite number per"
             " variable; values outside saturate"
         )
-    return ends
+    return limits
 
 
 def in_own_units(env: Env, low: NDArray[np.float64], high: NDArray[np.float64]) -> Env:

@@ -92,8 +92,8 @@ def integer_bounds(space: Space) -> list[tuple[int, int]] | None:
     if isinstance(space, gym.spaces.Discrete):
         return [(int(space.start), int(space.start) + int(space.n) - 1)]
     if isinstance(space, gym.spaces.MultiDiscrete):
-        first, n = np.ravel(space.start).tolist(), np.ravel(space.nvec).tolist()
-        return [(a, a + k - 1) for a, k in zip(first, n, strict=True)]
+        firsts, sizes = np.ravel(space.start).tolist(), np.ravel(space.nvec).tolist()
+        return [(first, first + size - 1) for first, size in zip(firsts, sizes, strict=True)]
     if isinstance(space, gym.spaces.MultiBinary):
         return [(0, 1)] * int(np.prod(space.shape))
     return None
@@ -140,6 +140,7 @@ def _key(key: Any) -> Any:
 
 
 def _key_of(data: object) -> Any:
+    """Return the key of a Dict that `_key` converted: lists become tuples again."""
     return tuple(map(_key_of, data)) if isinstance(data, list) else data
 
 
@@ -196,7 +197,7 @@ _WAYS_OUT = {
     " agent.action_space.high) scales them; where the units are the same,"
     " gymnasium.wrappers.TransformAction(env, lambda action: action, agent.action_space)",
 }
-_ROUNDING = 1e-5  # bounds whose relative difference is at most this are equal apart from rounding
+_ROUNDING = 1e-5  # largest relative difference of bounds that counts as rounding; chosen
 _MOST_SHOWN = 3  # largest number of variables that a message lists
 _MOST_CHARACTERS = 60  # the longest description of a space
 

@@ -158,20 +158,29 @@ def _flat_parts(space: Space, observation: Element) -> Iterator[Array]:
         if values.shape != space.shape:
             raise ValueError(f"must have shape {space.shape}")
         if isinstance(space, gym.spaces.Discrete | gym.spaces.MultiDiscrete):
-            is_read = np.isfinite(values)
-            if is_read.all() and values.dtype.kind == "f":
-                raise ValueError("must be whole numbers")
-            sizes = space.n if isinstance(space, gym.spaces.Discrete) else space.nvec
-            symbols = np.where(is_read, values, space.start) - space.start  # from 0
-            if not ((symbols >= 0) & (symbols < sizes) & (symbols == np.floor(symbols))).all():
-                raise ValueError(f"must be in {space}")
-            triples = zip(np.ravel(symbols), np.ravel(is_read), np.ravel(sizes), strict=True)
-            for symbol, was_read, size in triples:  # one-hot, or NaN for a missing symbol
-                yield np.eye(1, size, int(symbol))[0] if was_read else np.full(size, np.nan)
+            yield from _one_hot_parts(space, values)
             return
-        is_whole = np.dtype(space.dtype).kind in "iub" and np.isfinite(values).all()
-        is_cast = is_whole or np.dtype(space.dtype).kind == "f"  # integers have no NaN
-        yield (values.astype(space.dtype) if is_cast else values).reshape(-1)
+        # Cast as Gymnasium does, except that missing readings would be lost in integers.
+        space_dtype = np.dtype(space.dtype)
+        is_cast = space_dtype.kind == "f" or np.isfinite(values).all()
+        yield (values.astype(space_dtype) if is_cast else values).reshape(-1)
+
+
+def _one_hot_parts(space: Any, values: Array) -> Iterator[Array]:
+    """Yield a one-hot vector for each symbol of a Discrete or MultiDiscrete space.
+
+    A missing symbol has NaN. ValueError for symbols outside the space.
+    """
+    is_read = np.isfinite(values)
+    if is_read.all() and values.dtype.kind == "f":
+        raise ValueError("must be whole numbers")
+    sizes = space.n if isinstance(space, gym.spaces.Discrete) else space.nvec
+    symbols = np.where(is_read, values, space.start) - space.start  # from 0
+    if not ((symbols >= 0) & (symbols < sizes) & (symbols == np.floor(symbols))).all():
+        raise ValueError(f"must be in {space}")
+    triples = zip(np.ravel(symbols), np.ravel(is_read), np.ravel(sizes), strict=True)
+    for symbol, was_read, size in triples:
+        yield np.eye(1, size, int(symbol))[0] if was_read else np.full(size, np.nan)
 
 
 def _symbols_of(space: Space, first: int = 0) -> Iterator[tuple[int, int]]:
@@ -246,15 +255,16 @@ class Actions:
                 " gymnasium.spaces.Box(low, high)) gives it such"
             )
             raise argument_error("action_space", f"{problem}: {remedy}")
-        dtype = np.dtype(space.dtype)
-        self._dtype = dtype
+        self._dtype = np.dtype(space.dtype)
         self._shape = space.shape or ()
-        number: Any = {"f2": "float16", "f4": "float32"}.get(dtype.str[1:], "float64")
+        number: Any = "whole"
+        if self._dtype.kind == "f":
+            number = {2: "float16", 4: "float32"}.get(self._dtype.itemsize, "float64")
         self.config = _core.ActionConfig(
             low=low.astype(np.float64).tolist(),
             high=high.astype(np.float64).tolist(),
             discrete=not self.is_box,
-            number=number if dtype.kind == "f" else "whole",
+            number=number,
         )
 
     def elements(self, numbers: NDArray[np.float64]) -> Array:

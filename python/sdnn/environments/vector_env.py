@@ -81,8 +81,9 @@ class AcrobotSwingUpVectorEnv(gym.vector.VectorEnv[Array, ArrayLike, Array]):
         self.observation_space = batch_space(single.observation_space, self.num_envs)
         self._dtype = single.observation_space.dtype
         self._batch = _core.AcrobotBatch(self.config, self.num_envs)
-        self._tolerances = self._goal_tolerance.copy()
-        self._torques = np.zeros(self.num_envs)
+        self._tolerances = self._goal_tolerance.copy()  # those of the present episodes
+        self._torques = np.zeros(self.num_envs)  # N m, the last ones held
+        # Since the last reset of each: whether there was any, the goal is reached, it has ended.
         self._was_reset, self._success, self._ended = np.zeros((3, self.num_envs), np.bool_)
         self._picture: AcrobotPicture | None = None
 

@@ -20,11 +20,13 @@ from sdnn.support.arguments import one_of, path_of, require
 from sdnn.support.files import read_bytes
 
 Library = Literal["msvc", "libstdc++"]
-MOST_DRAWN = 2**27  # limit of drawn flips and words of tables, which take some seconds
+# Chosen limits, so that a damaged or hostile file takes neither long nor much memory.
+MOST_DRAWN = 2**27  # drawn flips and words of tables, which take some seconds
 MOST_BYTES = 2**20  # size of a parameter file
 MOST_BYTES_OF_MODEL = 2**31
 MOST_ITEMS = 100_000  # length of a list
 MOST_PAIRS = 1_000_000
+MOST_CHARACTERS = 1000  # of a formula
 
 OPERATORS: dict[type, Callable[..., float]] = {
     ast.Add: operator.add,
@@ -42,14 +44,15 @@ class LibsdnnInput:
     """Coding of one input: numbers in [0, 1], or symbols (whole numbers from 0)."""
 
     symbolic: bool
-    n_bins: int
-    n_flipped: int
+    n_bins: int  # patterns; LIBSDNN's q
+    n_flipped: int  # units by which consecutive patterns differ; LIBSDNN's r
 
 
 @dataclass(frozen=True, kw_only=True)
 class LibsdnnParameters:
     """The content of a parameter file; seeds are None for hardware entropy.
 
+    ``n_units`` are those of a pattern. ``pairs`` are of inputs, (modified, modifier).
     ``output_range`` and ``step_size`` are for regression, ``n_classes`` and ``scheme`` for
     classification.
     """
@@ -168,7 +171,10 @@ def naming(path: Path) -> Iterator[None]:
 
 
 def number_of(text: str, what: str) -> float:
-    """Evaluate a formula of numbers, ``+ - * / ^`` and parentheses."""
+    """Evaluate a formula of numbers, ``+ - * / ^`` and parentheses.
+
+    ValueError that names ``what`` if it is none, or its value is not finite.
+    """
 
     def value(node: ast.AST) -> float:
         """Evaluate a node of the parsed expression: numbers and arithmetic only."""
@@ -181,11 +187,12 @@ def number_of(text: str, what: str) -> float:
             return float(OPERATORS[type(node.op)](value(node.left), value(node.right)))
         raise ValueError
 
-    errors = ArithmeticError, LookupError, MemoryError, RecursionError, TypeError, ValueError
-    with suppress(SyntaxError, *errors):  # a formula of more than 1,000 characters is refused
-        result = value(ast.parse(text[:1001].replace("^", "**"), mode="eval").body)
-        if len(text) <= 1000 and np.isfinite(result):
-            return result
+    if len(text) <= MOST_CHARACTERS:
+        errors = ArithmeticError, LookupError, MemoryError, RecursionError, TypeError, ValueError
+        with suppress(SyntaxError, *errors):  # of texts that are no formula, or very deep ones
+            result = value(ast.parse(text.replace("^", "**"), mode="eval").body)
+            if np.isfinite(result):
+                return result
     raise ValueError(f"{what} must be a number, got {text[:80]!r}")
 
 
@@ -211,13 +218,18 @@ def items_of(text: str, what: str) -> list[str]:
 
 
 def split_outside_brackets(text: str) -> list[str]:
-    """Split at commas that are in no brackets."""
-    depth, commas = 0, [-1]
+    """Split at commas that are in no brackets.
+
+    >>> split_outside_brackets("(0,1),b")
+    ['(0,1)', 'b']
+    """
+    depth, begin, items = 0, 0, []
     for mark in re.finditer(r"[(),]", text):
         depth += {"(": 1, ")": -1, ",": 0}[mark[0]]
         if mark[0] == "," and depth == 0:
-            commas.append(mark.start())
-    return [text[i + 1 : j] for i, j in zip(commas, [*commas[1:], len(text)], strict=True)]
+            items.append(text[begin : mark.start()])
+            begin = mark.end()
+    return [*items, text[begin:]]
 
 
 class Entries(dict[str, str]):
@@ -372,8 +384,10 @@ def _parse_pairs(entries: Entries, n_inputs: int) -> tuple[tuple[int, int], ...]
         inputs = line.split(",")
         if len(inputs) != 2:
             raise ValueError(f"a combination must be two inputs, got {line[:80]!r}")
-        mu, nu = (whole_of(item, "an input of a combination", 0, n_inputs - 1) for item in inputs)
-        pairs.append((mu, nu))
+        modified, modifier = (
+            whole_of(item, "an input of a combination", 0, n_inputs - 1) for item in inputs
+        )
+        pairs.append((modified, modifier))
     if not pairs:
         raise ValueError("it must combine at least one pair of inputs")
     return tuple(pairs)
@@ -393,8 +407,8 @@ def _parse_parameters(text: str, path: Path) -> LibsdnnParameters:
         raise ValueError(f"{name} must have input_number = {n_inputs} items, got {len(inputs)}")
     name = "initial_value_range"
     limits = entries.list_of(f"SDNN/NN/{name}", "[-5,5]")
-    low, high = (whole_of(item, name, -(10**6), 10**6) for item in (limits * 2)[:2])
-    if len(limits) != 2 or low > high:
+    bounds = [whole_of(item, name, -(10**6), 10**6) for item in limits[:2]]
+    if len(limits) != 2 or bounds[0] > bounds[1]:
         raise ValueError(f"{name} must be two numbers that rise, got [{', '.join(limits)[:80]}]")
     parameters = LibsdnnParameters(
         task="regression" if task == "function_approximation" else "classification",
@@ -403,7 +417,7 @@ def _parse_parameters(text: str, path: Path) -> LibsdnnParameters:
         pairs=_parse_pairs(entries, n_inputs),
         pattern_seed=entries.seed("SDNN/PC/random_seed"),
         weight_seed=entries.seed("SDNN/NN/random_seed"),
-        initial_range=(low, high),
+        initial_range=(bounds[0], bounds[1]),
     )
     if parameters.task == "classification":
         scheme = entries.one_of("ISSUE/PR/multi_class_recognition", "1v1", "1vR")

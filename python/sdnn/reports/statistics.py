@@ -98,13 +98,13 @@ def estimate_contrast(
     )
 
 
-def interval_limits(distribution: FloatArray, confidence: float = CONFIDENCE) -> FloatArray:
-    """Return the lower and upper limit of the middle part of distributions over the last axis.
+def interval_limits(distribution: FloatArray) -> FloatArray:
+    """Return the limits of the middle 95 % of distributions over the last axis: lower, upper.
 
-    >>> interval_limits(np.arange(101.0), 0.9)
-    array([ 5., 95.])
+    >>> interval_limits(np.arange(201.0))
+    array([  5., 195.])
     """
-    tail = (1 - confidence) / 2
+    tail = (1 - CONFIDENCE) / 2
     limits = np.quantile(distribution, (tail, 1 - tail), axis=-1, method="inverted_cdf")
     return np.asarray(limits, np.float64)
 

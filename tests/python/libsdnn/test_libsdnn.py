@@ -22,13 +22,12 @@ BLANKS = ((400, 600, 400, 600), (200, 800, 100, 300), (100, 200, 300, 700), (800
 PARAMETERS = (FILES / "demonstration.txt").read_text()
 
 
-def demonstration_sample(n_samples, state=1):
+def demonstration_sample(n_samples):
     """Draw points of a lattice outside the blanks, and the function there, as LIBSDNN's demo does.
 
-    The random numbers are those of a linear congruential generator.
+    The random numbers are those of a linear congruential generator that begins with 1.
     """
-    points = []
-    targets = []
+    state, points, targets = 1, [], []
     while len(points) < n_samples:
         drawn = []
         for _ in range(2):

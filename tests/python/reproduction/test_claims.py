@@ -49,9 +49,9 @@ def cost(series, n_inputs, microseconds, config=None):
     )  # fmt: skip
 
 
-def verdicts(summaries, costs=()):
+def verdicts(summaries):
     """Return the verdicts by the numbers of their claims."""
-    return {o.claim.number: o.verdict for o in judge_claims(summaries, costs)}
+    return {outcome.claim.number: outcome.verdict for outcome in judge_claims(summaries)}
 
 
 @pytest.mark.parametrize(
