@@ -19,7 +19,7 @@ import signal
 import sys
 import tempfile
 import threading
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
@@ -76,6 +76,17 @@ def measured(kind: str, folder: Path = EVIDENCE) -> dict[Key, dict[str, Any]]:
         with ResultStore(place, read_only=True) as store:
             results = store.measurements(kind)
     return dict(sorted((tuple(json.loads(key)), content) for key, content in results.items()))
+
+
+def grouped(kind: str, folder: Path, n_dropped: int = 1) -> defaultdict[Key, list[dict[str, Any]]]:
+    """Read the measurements of a kind by their keys without the last part: seed, fold or trial.
+
+    ``n_dropped`` such parts are dropped. Other keys have no measurements.
+    """
+    groups = defaultdict(list)
+    for key, row in measured(kind, folder).items():
+        groups[key[:-n_dropped]].append(row)
+    return groups
 
 
 def measure_missing(

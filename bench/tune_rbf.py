@@ -18,11 +18,11 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections import defaultdict
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from measured import Key, measure_missing, measured, options
+from measured import grouped, measure_missing, options
 from page import markdown
 
 from sdnn.agents import QLearningConfig
@@ -124,16 +124,13 @@ def measure(stage: str, *key: Any) -> dict[str, Any]:
     }
 
 
-def medians(results: dict[Key, dict[str, Any]], stage: str) -> dict[Setting, dict[str, float]]:
+def medians(folder: Path, stage: str) -> dict[Setting, dict[str, float]]:
     """Return the medians over trials of each setting, the best score first."""
-    groups = defaultdict(list)
-    for (name, *values, _), row in results.items():
-        if name == stage:
-            groups[Setting(*values)].append(row)
     names = (*WINDOWS, "score")
     middles = {
-        setting: {name: float(np.median([row[name] for row in rows])) for name in names}
-        for setting, rows in groups.items()
+        Setting(*values): {name: float(np.median([row[name] for row in rows])) for name in names}
+        for (stage_of_rows, *values), rows in grouped(KIND, folder).items()
+        if stage_of_rows == stage
     }
     return dict(sorted(middles.items(), key=lambda item: -item[1]["score"]))
 
@@ -141,14 +138,14 @@ def medians(results: dict[Key, dict[str, Any]], stage: str) -> dict[Setting, dic
 def main() -> None:
     arguments = options(__doc__ or "", seeds=len(SEARCH_SEEDS), jobs=2).parse_args()
     for stage in STAGES:
-        grid = medians(measured(KIND, arguments.folder), "grid")
+        grid = medians(arguments.folder, "grid")
         seeds = REPORT_SEEDS if stage == "report" else SEARCH_SEEDS[: arguments.seeds]
         best = next(iter(grid), BEFORE)
         keys = [(stage, *setting, seed) for setting in settings_of(stage, best) for seed in seeds]
         measure_missing(KIND, measure, keys, arguments, apart=True)
         rows = [
             (*map(str, setting), *(f"{100 * share:.1f} %" for share in of.values()))
-            for setting, of in medians(measured(KIND, arguments.folder), stage).items()
+            for setting, of in medians(arguments.folder, stage).items()
         ]
         print(markdown((f"{stage}: bases", "width", "rate", "ties", *WINDOWS, "score"), rows))
 

@@ -9,11 +9,11 @@ dense product of each network's size is measured before and after the trial.
 from __future__ import annotations
 
 import time
-from collections import defaultdict
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from measured import measure_missing, measured, options
+from measured import Key, grouped, measure_missing, options
 from page import markdown, show
 
 from sdnn import _core
@@ -54,16 +54,14 @@ def measure(case: str, number: int) -> dict[str, Any]:
     }
 
 
-def table(results: dict[tuple[Any, ...], dict[str, Any]]) -> str:
-    groups = defaultdict(list)
-    for (case, _), row in results.items():
-        groups[case].append(row)
+def table(groups: Mapping[Key, list[dict[str, Any]]]) -> str:
+    """Return the table of trials, which are grouped by case."""
 
     def cells(case):
         """Return the row of a case: medians and ranges of its trials, means over decisions."""
 
         def column(name):
-            return np.array([row[name] for row in groups[case]])
+            return np.array([row[name] for row in groups[case,]])
 
         def spread(name):
             values = column(name)
@@ -81,15 +79,15 @@ def table(results: dict[tuple[Any, ...], dict[str, Any]]) -> str:
         "case", "seconds a trial", "us a decision", "times faster than a dense product",
         "full passes a decision",
     )  # fmt: skip
-    return markdown(header, [cells(case) for case in CASES if case in groups])
+    return markdown(header, [cells(case) for case in CASES if (case,) in groups])
 
 
 def main() -> None:
     arguments = options(__doc__ or "", seeds=10, jobs=2).parse_args()
     keys = [(case, number) for number in range(arguments.seeds) for case in CASES]
     measure_missing(KIND, measure, keys, arguments, apart=True)
-    results = measured(KIND, arguments.folder)
-    show({"whole trials": table(results)}, arguments.folder / "performance.md")
+    groups = grouped(KIND, arguments.folder)
+    show({"whole trials": table(groups)}, arguments.folder / "performance.md")
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from sdnn.export import c_header, new_agent
 
 HERE = Path(__file__).parent
 N_STEPS = 100_000
+N_EPISODES = 100
 N_ROWS = 2000
 SCALE = 2.0**16
 HIGH = np.array([np.pi, 8.0])
@@ -46,14 +47,14 @@ def train(agent, env, n_steps):
     return np.array(rows).astype("<i4"), np.array(actions)
 
 
-def mean_return(agent, env, n_episodes=100):
-    """Return the mean return of greedy episodes."""
+def mean_return(agent, env):
+    """Return the mean return of `N_EPISODES` greedy episodes."""
     total = 0.0
-    for episode in range(n_episodes):
+    for episode in range(N_EPISODES):
         env.reset(seed=10**6 + episode)
         for _ in range(200):
             total += float(env.step(agent.act(observe(env), explore=False))[1])
-    return total / n_episodes
+    return total / N_EPISODES
 
 
 def pendulum_agents():

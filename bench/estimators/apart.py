@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import numpy as np
 import problems
 import real
-from measured import measure_missing, measured, options
+from measured import grouped, measure_missing, options
 from page import show
 from real_data import CLASSIFICATION_APART, REGRESSION_APART, samples
 from scipy.stats import rankdata
@@ -89,9 +89,7 @@ def main():
     measure_missing(KIND, real.measure, keys(), arguments)
     if arguments.only:
         return
-    results = defaultdict(list)
-    for (problem, model, _), row in measured(KIND, arguments.folder).items():
-        results[problem, model].append(row)
+    results = grouped(KIND, arguments.folder)
     complete = {key: rows for key, rows in results.items() if len(rows) == real.N_FOLDS}
     results = defaultdict(list, complete)
     columns = {}

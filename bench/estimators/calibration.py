@@ -11,7 +11,6 @@ from __future__ import annotations
 import sys
 import time
 import warnings
-from collections import defaultdict
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -24,7 +23,7 @@ import stream_data
 from baselines import WithClasses
 from catboost import CatBoostClassifier
 from figures import interval_figure
-from measured import measure_missing, measured, options
+from measured import grouped, measure_missing, options
 from page import markdown, show
 from real import calibration_error, make_model
 from sklearn.datasets import make_classification
@@ -174,14 +173,6 @@ def measure_probabilities(problem, name, seed):
     return {what: round(float(value), 5) for what, value in results.items()} | {
         "fit_s": round(spent, 3)
     }
-
-
-def grouped(kind, folder):
-    """Return the rows of all seeds by problem, and by model if there are several."""
-    results = defaultdict(list)
-    for key, row in measured(kind, folder).items():
-        results[key[:-1]].append(row)
-    return results
 
 
 def mean(rows, what):

@@ -12,7 +12,6 @@ from __future__ import annotations
 import sys
 import time
 import warnings
-from collections import defaultdict
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -21,7 +20,7 @@ import numpy as np
 from baselines import classifiers, regressors, tuned
 from demonstration import N_TRAINING, errors, lattice, target, training_points
 from figures import COLORS, demonstration_figure, kernel_figure, useless_figure
-from measured import measure_missing, measured, options
+from measured import grouped, measure_missing, measured, options
 from page import markdown
 from scipy import stats
 from sklearn.datasets import load_breast_cancer, load_diabetes
@@ -180,14 +179,6 @@ def seeds(n_pattern_units, seed):
 # The tables.
 
 
-def grouped(kind, folder, n_words):
-    """Return measurements by the first words of their keys."""
-    results = defaultdict(list)
-    for key, row in measured(kind, folder).items():
-        results[key[:n_words]].append(row)
-    return results
-
-
 def spread_of(group, name):
     values = [row[name] for row in group]
     text = f"{np.mean(values):.4f}"
@@ -247,10 +238,10 @@ def main():
     if arguments.only:
         return
     folder = arguments.folder
-    print(demonstration_table(grouped("regression demonstration", folder, 1)))
-    print(useless_table(grouped("regression useless", folder, 2)))
-    print(*real_tables(grouped("regression real", folder, 2)), sep="\n")
-    print(seeds_table(grouped("regression seeds", folder, 1)))
+    print(demonstration_table(grouped("regression demonstration", folder)))
+    print(useless_table(grouped("regression useless", folder)))
+    print(*real_tables(grouped("regression real", folder, n_dropped=2)), sep="\n")
+    print(seeds_table(grouped("regression seeds", folder)))
     network = ours(8000, N_EPOCHS, 0)
     for name, figure in {
         "demonstration": demonstration_figure(network),

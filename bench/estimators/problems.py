@@ -12,7 +12,6 @@ from __future__ import annotations
 import sys
 import time
 import warnings
-from collections import defaultdict
 from functools import lru_cache
 from pathlib import Path
 
@@ -24,7 +23,7 @@ from catboost import CatBoostClassifier, CatBoostRegressor
 from demonstration import target, training_points
 from lightgbm import LGBMClassifier, LGBMRegressor
 from matplotlib.figure import Figure
-from measured import measure_missing, measured, options
+from measured import grouped, measure_missing, options
 from page import markdown, show
 from river import datasets
 from sklearn.datasets import (
@@ -414,9 +413,7 @@ def main():
     measure_missing(KIND, measure, keys(arguments.seeds), arguments)
     if arguments.only:
         return
-    results = defaultdict(list)
-    for (problem, model, _), row in measured(KIND, arguments.folder).items():
-        results[problem, model].append(row)
+    results = grouped(KIND, arguments.folder)
     draw(results, arguments.folder / "problems.png")
     summary = {}
     for unit, (problems, models) in TABLES.items():

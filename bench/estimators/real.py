@@ -12,7 +12,6 @@ from __future__ import annotations
 import sys
 import time
 import warnings
-from collections import defaultdict
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -21,7 +20,7 @@ import numpy as np
 import problems
 from catboost import CatBoost
 from lightgbm import LGBMModel
-from measured import measure_missing, measured, options
+from measured import grouped, measure_missing, options
 from page import show
 from real_data import CLASSIFICATION, NUMBERS, REGRESSION, is_word, samples
 from sklearn.compose import ColumnTransformer
@@ -167,9 +166,7 @@ def main():
     measure_missing(KIND, measure, keys(), arguments)
     if arguments.only:
         return
-    results = defaultdict(list)
-    for (problem, model, _), row in measured(KIND, arguments.folder).items():
-        results[problem, model].append(row)
+    results = grouped(KIND, arguments.folder)
     summary, tables = {}, {}
     for title, (what, sign, data, models) in TABLES.items():
         middles = sign * problems.middles_of(results, data, models, what, np.mean)
