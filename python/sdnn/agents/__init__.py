@@ -22,9 +22,8 @@ from sdnn.training.callbacks import (
     StopTrainingOnRewardThreshold,
     TensorBoard,
 )
-from sdnn.training.episodes import UnrepeatedEpisodeError
 from sdnn.training.evaluation import Evaluation, evaluate
-from sdnn.training.interfaces import Transition, UnusableStepError
+from sdnn.training.interfaces import Transition, UnrepeatedEpisodeError, UnusableStepError
 from sdnn.training.training import Callback, CheckpointCallback, Training, TrainingResult
 
 __all__ = [

@@ -13,6 +13,7 @@ import numpy as np
 from sdnn.agents.agent import Agent, AnyAgent
 from sdnn.agents.fuzzy_q_learning import FuzzyQLearning
 from sdnn.agents.logs import Logged, reader_of
+from sdnn.environments.spaces import allows_no_action
 from sdnn.support.arguments import is_of_class, require, whole
 from sdnn.training.interfaces import Transition, explained
 
@@ -51,7 +52,8 @@ def learn_from(agent: AnyAgent, dataset: Dataset, *, epochs: int = 1) -> int:
         ``timeouts``, ``dones``, ...) and columns such as ``observation_0`` are read, too. Or
         transitions: `Transition`, mappings, or tuples of observation, action, reward, next
         observation, terminated and perhaps truncated. Or episodes, also a dataset of Minari:
-        objects or mappings with one observation more than rewards.
+        objects or mappings with one observation more than rewards. A step that is truncated where
+        ``next_masks`` allow no action is learned as terminated.
     epochs : int
         How often the dataset is learned.
 
@@ -100,7 +102,7 @@ def learn_log(agent: AnyAgent, log: Iterable[Logged]) -> None:
     """Learn logged transitions once, with all pending n-step returns."""
     agent.begin_episode()
     for logged in log:
-        transition = with_action(agent, logged.transition)
+        transition = learned_transition(agent, logged)
         agent.learn(transition)
         if logged.truncated or transition.terminated:
             agent.begin_episode()
@@ -110,20 +112,28 @@ def learn_log(agent: AnyAgent, log: Iterable[Logged]) -> None:
 def checked_length(agent: AnyAgent, log: Iterator[Logged]) -> int:
     """Count transitions after checking each; an error names the place in the log."""
     n = n_episodes = 0
-    for place, transition, truncated in log:
+    for logged in log:
         try:
-            agent.check(with_action(agent, transition))
+            transition = learned_transition(agent, logged)
+            agent.check(transition)
         except (TypeError, ValueError) as error:
-            episode = "" if place.startswith("episode") else f"episode {n_episodes}, "
-            raise type(error)(f"dataset, {episode}{place}: {error}") from error
+            episode = "" if logged.place.startswith("episode") else f"episode {n_episodes}, "
+            raise type(error)(f"dataset, {episode}{logged.place}: {error}") from error
         n += 1
-        n_episodes += truncated or transition.terminated
+        n_episodes += logged.truncated or transition.terminated
     return n
 
 
-def with_action(agent: AnyAgent, transition: Transition) -> Transition:
-    """Return a transition whose action is an int if the log has it as a float or an array."""
-    if not isinstance(agent.action_space, gym.spaces.Discrete) or type(transition.action) is int:
+def learned_transition(agent: AnyAgent, logged: Logged) -> Transition:
+    """Return a logged transition as the agent learns it; ValueError for an unusable mask.
+
+    A discrete action becomes an int where the log has it as a float or an array. A step that is
+    truncated in a state in which no action is allowed terminates: no value can follow it.
+    """
+    transition, space = logged.transition, agent.action_space
+    if logged.truncated and allows_no_action(space, "next_mask", transition.next_mask):
+        transition = transition._replace(terminated=True)
+    if not isinstance(space, gym.spaces.Discrete) or type(transition.action) is int:
         return transition
     number = np.asarray(transition.action)
     is_whole = number.size == 1 and number.dtype.kind in "iuf" and float(number.item()).is_integer()

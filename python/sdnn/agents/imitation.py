@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 from sdnn import _core
 from sdnn.agents.actor_critic import SDNNActorCritic
-from sdnn.agents.datasets import Dataset, checked_length, learn_log, with_action
+from sdnn.agents.datasets import Dataset, checked_length, learn_log, learned_transition
 from sdnn.agents.logs import Logged, reader_of
 from sdnn.agents.q_lambda import SDNNQLambda
 from sdnn.support.arguments import is_of_class, require, whole
@@ -101,7 +101,7 @@ def _episodes(agent: LinearAgent, log: Iterator[Logged]) -> Iterator[tuple[Steps
     """Yield the steps of each episode and whether it terminated; long episodes come in parts."""
     steps: list[Transition] = []
     for logged in log:
-        steps.append(with_action(agent, logged.transition))
+        steps.append(learned_transition(agent, logged))
         terminated = steps[-1].terminated
         if terminated or logged.truncated or len(steps) == _MOST_STEPS:
             yield steps, terminated

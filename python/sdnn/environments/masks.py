@@ -15,7 +15,8 @@ class ActionMasks(gym.Wrapper[Element, Element, Element, Element], gym.utils.Rec
     """Adds ``info["action_mask"]``, with 1 for each allowed action, which agents follow.
 
     `sdnn.agents.Agent.train` and `sdnn.agents.evaluate` follow the masks of environments, or
-    vectors of such, whose ``metadata["action_masks"]`` is True, as this wrapper makes it.
+    vectors of such, whose ``metadata["action_masks"]`` is True, as this wrapper makes it. A step
+    that is truncated in a state in which no action is allowed is learned as one that terminates.
 
     Parameters
     ----------

@@ -328,6 +328,19 @@ class Actions:
             raise ValueError(f"action must be in {self.space}, got {shown(action)}") from None
 
 
+def allows_no_action(space: Space, name: str, mask: Any) -> bool:
+    """Return whether a mask forbids all actions of a dimension, so that no action can follow.
+
+    ValueError, which names the argument, if it is no mask of the discrete actions of ``space``.
+    """
+    if mask is None or integer_bounds(space) is None:  # spaces of real numbers have no masks
+        return False
+    actions = Actions(space)
+    allowed: Any = actions.mask(name, mask)
+    dimensions = np.split(allowed, np.cumsum(actions.n_actions)[:-1])
+    return not all(dimension.any() for dimension in dimensions)
+
+
 def controller_error(error: ValueError, observations: Observations, actions: Actions) -> Exception:
     """Return an error of the core about a setting, or about a size that follows from a space."""
     argument, problem = blamed(error)

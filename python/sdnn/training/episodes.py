@@ -10,6 +10,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
+from sdnn.environments.spaces import allows_no_action
 from sdnn.environments.types import AnyEnv, Data, Element, Elements, Env, Info, Mask, Masks
 from sdnn.support.arguments import duration_of, flag, reward_of, shown
 from sdnn.training.files import (
@@ -27,7 +28,9 @@ from sdnn.training.interfaces import (
     ObservingLearner,
     Options,
     Seeds,
+    UnrepeatedEpisodeError,
     UnusableStepError,
+    missing_in_info,
     warn_of_endless_episode,
 )
 
@@ -41,10 +44,6 @@ _OLD_API = (
 )
 
 
-class UnrepeatedEpisodeError(ValueError):
-    """An environment does not repeat the episode in which a training was saved."""
-
-
 def announces(env: object, what: str) -> bool:
     """Return whether the metadata of an environment, or a vector, say that infos have something."""
     return bool((getattr(env, "metadata", None) or {}).get(what))
@@ -53,33 +52,17 @@ def announces(env: object, what: str) -> bool:
 def duration_in(info: Info) -> float:
     """Return the duration of a step in an info; UnusableStepError if there is none."""
     if "dt" not in info:
-        raise UnusableStepError(
-            "info must have 'dt', the duration of the step in usual steps, as"
-            f" metadata['durations'] of env is True, got {shown(sorted(map(str, info)))}"
-        )
+        raise missing_in_info("dt", info)
     try:
         return duration_of(info["dt"])
     except ValueError as error:
         raise UnusableStepError(str(error)) from error
 
 
-def _require_durations(dts: Sequence[float], environments: Sequence[int]) -> None:
-    """Raise UnusableStepError if an environment of a vector gave no duration of its step."""
-    for i in environments:
-        if math.isnan(dts[i]):
-            raise UnusableStepError(
-                f"dt must be in the info of environment {i}, the duration of the step in usual"
-                " steps, as metadata['durations'] of env is True, got nan or nothing"
-            )
-
-
 def mask_in(info: Info) -> Mask:
     """Return the mask in an info; UnusableStepError if there is none."""
     if "action_mask" not in info:
-        raise UnusableStepError(
-            "info must have 'action_mask', as metadata['action_masks'] of env is True,"
-            f" got {shown(sorted(map(str, info)))}"
-        )
+        raise missing_in_info("action_mask", info)
     mask: Mask = info["action_mask"]
     return mask
 
@@ -183,10 +166,10 @@ class Episode:
 class Episodes:
     """The episodes in all environments of a training: begins, steps and repeats them.
 
-    ``options`` returns those of a single environment's reset from the episode's number, and
-    ``unusable`` the error for one of a step or reset, in an environment or in any (None). ``seed``
-    is the root of the episodes' seeds; None: resets have no seeds. ``first`` is the number of the
-    first episode.
+    ``seed`` is the root of the episodes' seeds; None: resets have no seeds. ``first`` is the number
+    of the first episode, from 0. Without ``limit_bootstraps`` truncated steps are learned as
+    terminated. ``unusable`` makes the error about a step or reset from its cause, and from the
+    environment, None if any may be the cause.
 
     Attributes
     ----------
@@ -199,8 +182,10 @@ class Episodes:
     observations, previous_observations, actions, masks
         The latest observations, those before the last step, the actions of that step, and the masks
         of the latest observations where environments have them, as the learner reads them.
+    options : callable
+        Returns the options of a reset from the number of the episode, counted from 1.
     adapter : EnvironmentAdapter
-        Has the rewards and ends of the last step.
+        Has the outcome of the last step: rewards, ends, durations.
     wrappers, learned : list
         The wrappers that learn, and what they had learned when the last episode began.
     """
@@ -215,11 +200,13 @@ class Episodes:
         learner: ObservingLearner,
         seed: int | None,
         first: int,
+        limit_bootstraps: bool,
         options: Callable[[int], Data | None],
         unusable: Callable[[Exception, int | None], UnusableStepError],
     ) -> None:
-        self._env, self._seed, self._options = env, seed, options
+        self._env, self._seed, self.options = env, seed, options
         self._unusable, self._learner = unusable, learner
+        self._limit_bootstraps = limit_bootstraps
         self.adapter = adapter
         self.wrappers = learning_wrappers(env)
         self.learned: list[Statistics] = []
@@ -283,8 +270,6 @@ class Episodes:
                 present.actions.pack()
         try:
             observations = self.adapter.step(actions)
-            if self.adapter.dts is not None:
-                _require_durations(self.adapter.dts, self.unlearned)
         except UnusableStepError as error:
             raise self._unusable(error, None) from error
         self.observations = self._read("next_observation", observations)
@@ -299,15 +284,30 @@ class Episodes:
         adapter = self.adapter
         return adapter.terminated[environment] or adapter.truncated[environment]
 
-    def ended(self) -> list[bool]:
-        """Return in which environments the last step has ended the episode."""
+    def terminal(self) -> list[bool]:
+        """Return in which environments the last step is learned without a value that follows it."""
+        if not any(self.adapter.truncated):
+            return self.adapter.terminated
+        return [self._is_terminal(i) for i in self._environments]
+
+    def _is_terminal(self, environment: int) -> bool:
+        """Return whether the last step terminated an episode, or counts as if it had.
+
+        A truncated step does so in a state in which no action is allowed, and everywhere unless
+        limits bootstrap.
+        """
         adapter = self.adapter
-        return [a or b for a, b in zip(adapter.terminated, adapter.truncated, strict=True)]
+        if adapter.terminated[environment] or not adapter.truncated[environment]:
+            return adapter.terminated[environment]
+        if not self._limit_bootstraps or adapter.masks is None:
+            return not self._limit_bootstraps
+        space = getattr(self._env, "single_action_space", self._env.action_space)
+        return allows_no_action(space, "action_mask", adapter.masks[environment])
 
-    def note_learned(self, n: int) -> tuple[int, bool]:
-        """Remove n environments from the beginning of `unlearned`; add their rewards.
+    def note_learned(self, n: int) -> int:
+        """Remove n environments from the beginning of `unlearned`; return the last of them.
 
-        Returns the last of them, and whether its episode is over.
+        Their rewards are added to those of their episodes.
         """
         environments, rewards = self.unlearned[:n], self.adapter.rewards
         del self.unlearned[:n]
@@ -316,8 +316,7 @@ class Episodes:
             episode.sum_of_rewards += rewards[i]
             if episode.n_steps == _ENDLESS and not self.is_over(i):
                 warn_of_endless_episode(_ENDLESS)
-        i = environments[-1]
-        return i, self.adapter.terminated[i] or self.adapter.truncated[i]
+        return environments[-1]
 
     def _reset(self, numbers: Mapping[int, int]) -> dict[int, Element]:
         """Reset environments (keys) for episodes of these numbers; return first observations."""
@@ -325,7 +324,7 @@ class Episodes:
             i: None if self._seed is None else episode_seed(self._seed, _LEARNING, number)
             for i, number in numbers.items()
         }
-        return self.adapter.reset(seeds, self._options(1 + max(numbers.values())))
+        return self.adapter.reset(seeds, self.options(1 + max(numbers.values())))
 
     def _store_first_observations(self, first_observations: dict[int, Element]) -> None:
         """Store the first observations of episodes that have begun, as the learner reads them."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 import inspect
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from sdnn._core import Controller
 from sdnn.config import fields_of
 from sdnn.environments.types import Array, Data, Element, Elements, Mask, Masks
-from sdnn.support.arguments import explains_names
+from sdnn.support.arguments import explains_names, shown
 from sdnn.support.habits import advice
 
 Seeds: TypeAlias = Mapping[int, int | None]
@@ -28,6 +28,23 @@ _LARGEST_DISCOUNT = 0.998
 
 class UnusableStepError(ValueError):
     """A step or reset of an environment cannot be used; the message names it and the reason."""
+
+
+class UnrepeatedEpisodeError(ValueError):
+    """An environment does not repeat the episode in which a training was saved."""
+
+
+_ANNOUNCED_BY = {"action_mask": "action_masks", "dt": "durations"}
+"""The key of the metadata that announces a key of every info."""
+
+
+def missing_in_info(key: str, keys: Iterable[object], where: str = "info") -> UnusableStepError:
+    """Return the error about an info that lacks a key which the metadata announce."""
+    meaning = ", the duration of the step in usual steps" if key == "dt" else ""
+    return UnusableStepError(
+        f"{where} must have {key!r}{meaning}, as metadata[{_ANNOUNCED_BY[key]!r}] of env is True,"
+        f" got {shown(sorted(map(str, keys)))}"
+    )
 
 
 class EnvironmentAdapter(abc.ABC):
@@ -72,6 +89,8 @@ class Transition(NamedTuple):
     ``terminated`` is Gymnasium's: the episode ended in a terminal state. An episode cut off by a
     time limit (``truncated``) is not terminated; its last transition is learned like any other.
     ``next_mask`` has 1 for the actions that are allowed in a next state, as `Agent.act` has it.
+    Where an episode is cut off in a state in which no action is allowed, no value can follow:
+    ``terminated`` must be True then, as `Agent.train`, `learn_from` and `imitate` make it.
     ``dt`` is the step's duration in usual steps, from 0.001 to 1,000,000: the discount of the next
     state's value is ``discount ** dt``.
     """

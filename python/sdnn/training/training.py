@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sdnn.environments.space_kinds import require_same_kind, require_single
-from sdnn.environments.types import AnyEnv, Env, Info, VectorEnv
+from sdnn.environments.types import AnyEnv, Data, Env, Info, VectorEnv
 from sdnn.support.arguments import flag, has_methods, path_of, require, shown, whole
 from sdnn.support.display import Displayed
 from sdnn.training.episodes import Episodes, SingleEnvironment
@@ -27,7 +27,7 @@ from sdnn.training.files import (
     write_training,
 )
 from sdnn.training.interfaces import EnvironmentAdapter, Learner, explained
-from sdnn.training.loop import Row, TrainingLoop, learner_for_all
+from sdnn.training.loop import Row, TrainingLoop, learner_adapter
 
 _SETTINGS = (
     "seed", "evaluate_every", "evaluate_every_episodes", "evaluation_episodes", "limit_bootstraps"
@@ -254,9 +254,16 @@ class Training(TrainingLoop):
         self.rows = []
         self.blocks = {}
         adapter = _adapter_for(env)
-        self._learner = learner_for_all(agent, adapter.n_environments)
+        self._learner = learner_adapter(agent, adapter.n_environments)
         self._episodes = Episodes(
-            env, adapter, self._learner, self.seed, first, self._options, self._unusable
+            env,
+            adapter,
+            self._learner,
+            self.seed,
+            first,
+            self.limit_bootstraps,
+            self._options,
+            self._unusable,
         )
         if reset_options is not None and self.n_environments > 1:
             raise ValueError("reset_options must be None for a vector environment")
@@ -362,6 +369,14 @@ class Training(TrainingLoop):
             training._episodes.learned = learned
             training._episodes.repeat(saved.present)
         return training
+
+    def _options(self, episode: int) -> Data | None:
+        """Return the options of the reset for a number of episodes; None without a function."""
+        if self.reset_options is None:
+            return None
+        made = self.reset_options(episode)
+        require(isinstance(made, Mapping), "reset_options", "return a mapping", made, TypeError)
+        return dict(made)
 
     def _find_listeners(self) -> list[tuple[int, Callback]]:
         """Return the callbacks that are called after steps, each with its interval; ValueError."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import abc
-import math
 from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import Any
 
@@ -15,8 +14,14 @@ from numpy import ndarray
 from sdnn.environments.spaces import has_mask
 from sdnn.environments.types import Element, Elements, Info, Mask, VectorEnv
 from sdnn.support.arguments import array_of
-from sdnn.training.episodes import SingleEnvironment, announces, mask_in, reset_env, step_env
-from sdnn.training.interfaces import EnvironmentAdapter, Options, Seeds, UnusableStepError
+from sdnn.training.episodes import SingleEnvironment, announces, reset_env, step_env
+from sdnn.training.interfaces import (
+    EnvironmentAdapter,
+    Options,
+    Seeds,
+    UnusableStepError,
+    missing_in_info,
+)
 
 
 def vector_adapter(env: VectorEnv) -> EnvironmentAdapter:
@@ -38,6 +43,8 @@ class _SyncEnvironments(EnvironmentAdapter):
         self.n_environments = env.num_envs
         self.masks = [None] * env.num_envs if announces(env, "action_masks") else None
         self.dts = [1.0] * env.num_envs if announces(env, "durations") else None
+        for adapter in self._adapters:
+            adapter.dts = None if self.dts is None else [1.0]  # the vector's metadata decide
 
     def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Element]:
         first = self._call_each(seeds, lambda env, i: env.reset({0: seeds[i]})[0])
@@ -63,7 +70,7 @@ class _SyncEnvironments(EnvironmentAdapter):
         if self.masks is not None:
             self.masks = [env.masks[0] if env.masks else None for env in self._adapters]
         if self.dts is not None:
-            self.dts = [env.dts[0] if env.dts else math.nan for env in self._adapters]
+            self.dts = [env.dts[0] for env in self._adapters if env.dts]
         return results
 
     def _converted(self, observations: list[Element]) -> Elements:
@@ -96,6 +103,8 @@ class _Vector(EnvironmentAdapter, abc.ABC):
         self.masks = [None] * env.num_envs if announces(env, "action_masks") else None
         self.dts = [1.0] * env.num_envs if announces(env, "durations") else None
         self._begun: list[Mask] = []  # masks of episodes that began within the last step
+        self._resetting: Collection[int] = ()
+        """Environments in which the next step is a reset, whose info has no duration."""
 
     def _step(self, actions: Elements) -> tuple[Elements, Elements]:
         """Step; return the observations, and those after resets (mode ``SAME_STEP``)."""
@@ -133,32 +142,50 @@ class _Vector(EnvironmentAdapter, abc.ABC):
         self.masks = masks
 
     def _durations_in(self, infos: Info, ended: Sequence[bool]) -> list[float]:
-        """Return the durations in infos, those of last steps from ``final_info`` if it is there."""
-        dts = self._column_in(infos)
-        if self._mode == "SAME_STEP" and any(ended):
-            last = self._column_in(infos.get("final_info", {}))
-            dts = [last[i] if has_ended else dts[i] for i, has_ended in enumerate(ended)]
+        """Return the durations of the last step; UnusableStepError if one is missing.
+
+        With autoreset in the same step, those of last steps are in ``final_info``.
+        """
+        is_final = [self._mode == "SAME_STEP" and has_ended for has_ended in ended]
+        dts = self._dt_column(infos, [not is_last for is_last in is_final])
+        if any(is_final):
+            last = self._dt_column(infos.get("final_info", {}), is_final)
+            dts = [last[i] if is_last else dts[i] for i, is_last in enumerate(is_final)]
         return dts
 
-    def _column_in(self, infos: Info) -> list[float]:
-        """Return the numbers ``dt`` in infos, NaN where one is missing."""
-        if "dt" not in infos:
-            return [math.nan] * self.n_environments
-        is_there = infos.get("_dt", np.ones(self.n_environments, bool))
-        numbers = self._column("dt", np.where(is_there, infos["dt"], math.nan), "fiu", "numbers")
+    def _dt_column(self, infos: Info, needed: Sequence[bool]) -> list[float]:
+        """Return the numbers ``dt`` in infos, 1 where not needed, also in the step of a reset."""
+        needed = [n and i not in self._resetting for i, n in enumerate(needed)]
+        if not any(needed):
+            return [1.0] * self.n_environments
+        self._require_key("dt", infos, needed)
+        numbers = self._column("dt", np.where(needed, infos["dt"], 1.0), "fiu", "numbers")
         return [float(number) for number in numbers]
 
     def _masks_in(self, infos: Info, needed: Sequence[bool]) -> list[Mask]:
         """Return the masks in infos, None where not needed; UnusableStepError if one is missing."""
         if not any(needed):
             return [None] * self.n_environments
-        masks: Any = mask_in(infos)
-        has_mask_of = infos.get("_action_mask", np.ones(self.n_environments, bool))
-        for i in np.flatnonzero(needed):
-            if not has_mask_of[i]:
-                raise UnusableStepError(f"info of environment {i} must have 'action_mask'")
+        self._require_key("action_mask", infos, needed)
+        masks: Any = infos["action_mask"]
         rows = list(zip(*masks, strict=True)) if isinstance(masks, tuple) else masks
         return [rows[i] if is_needed else None for i, is_needed in enumerate(needed)]
+
+    def _require_key(self, key: str, infos: Info, needed: Sequence[bool]) -> None:
+        """Raise UnusableStepError if the info of a needed environment lacks a key.
+
+        In a vector's infos, flags under ``"_" + key`` tell which environments have the key; without
+        flags all have it.
+        """
+
+        def has_key(name: str, i: int) -> bool:
+            """Return whether the info of environment `i` has a key."""
+            return name in infos and bool(infos.get(f"_{name}", needed)[i])
+
+        for i in np.flatnonzero(needed).tolist():
+            if not has_key(key, i):
+                keys = [name for name in infos if not name.startswith("_") and has_key(name, i)]
+                raise missing_in_info(key, keys, f"info of environment {i}")
 
     def _note_masks(self, infos: Info, begun: Collection[int]) -> None:
         """Store the masks of the environments that were reset."""
@@ -227,6 +254,7 @@ class _AutomaticResets(_Vector):
             self._note_masks(infos, range(self.n_environments))
             self._after_resets = _split_batch(self._env, observations)
         elif self._mode != "SAME_STEP":
+            self._resetting = seeds.keys()
             return {}
         elif self.masks is not None:
             self.masks = [self._begun[i] if i in seeds else m for i, m in enumerate(self.masks)]
@@ -234,6 +262,7 @@ class _AutomaticResets(_Vector):
 
     def step(self, actions: Elements) -> Elements:
         observations, self._after_resets = self._step(actions)
+        self._resetting = ()
         return observations
 
 

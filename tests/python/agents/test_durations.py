@@ -329,18 +329,55 @@ def test_impossible_durations_are_refused_and_change_nothing(agent_class, dt):
         agent.train(gym.vector.SyncVectorEnv([lambda: env]), steps=10)
 
 
-def test_an_environment_whose_metadata_announce_durations_must_return_them():
-    class WithoutInfo(Courier):
+class Misnaming(Courier):
+    """Announces durations, but returns them under another key."""
+
+    def step(self, action):
+        *outcome, info = super().step(action)
+        return *outcome, {"duration": info["dt"], "job": 1}
+
+
+def test_an_error_about_a_missing_duration_names_the_keys_of_the_info():
+    agent = agent_and_courier(SDNNQLambda)[0]
+    keys = r"got \['duration', 'job'\]"
+    with pytest.raises(UnusableStepError, match=f"info must have 'dt'.*{keys}"):
+        agent.train(Misnaming(), steps=10)
+
+
+@pytest.mark.parametrize("mode", ["NEXT_STEP", "SAME_STEP", "DISABLED"])
+@pytest.mark.parametrize("vector_class", [gym.vector.SyncVectorEnv, gym.vector.AsyncVectorEnv])
+def test_an_error_about_a_missing_duration_names_the_environment_of_a_vector(vector_class, mode):
+    agent = agent_and_courier(SDNNQLambda)[0]
+    envs = vector_class([Courier, Misnaming], autoreset_mode=gym.vector.AutoresetMode[mode])
+    message = r"environment 1\b.* must have 'dt'.*got \['duration', 'job'\]"
+    with pytest.raises(UnusableStepError, match=message):
+        agent.train(envs, steps=10)
+    envs.close()
+
+
+@pytest.mark.parametrize("vector_class", [gym.vector.SyncVectorEnv, gym.vector.AsyncVectorEnv])
+def test_the_metadata_of_a_vectors_first_environment_decide_for_all(vector_class):
+    agent = agent_and_courier(SDNNQLambda)[0]
+    envs = vector_class([Courier, lambda: Courier(has_durations=False)])
+    assert agent.train(envs, steps=10).n_steps == 10
+    envs.close()
+
+
+def test_a_missing_duration_of_an_episodes_last_step_is_looked_for_in_its_final_info(monkeypatch):
+    monkeypatch.setattr("sdnn.training.vectors._resets_each", lambda env: False)
+
+    class ForgettingTheLast(Courier):
         def step(self, action):
-            return *super().step(action)[:4], {}
+            *outcome, info = super().step(action)
+            return *outcome, {"job": 1} if self.n == 50 else info
 
     agent = agent_and_courier(SDNNQLambda)[0]
-    with pytest.raises(UnusableStepError, match="info must have 'dt'"):
-        agent.train(WithoutInfo(), steps=10)
-    for vector_class in (gym.vector.SyncVectorEnv, gym.vector.AsyncVectorEnv):
-        names_second_one = r"\bdt\b.*environment 1\b|environment 1: .*'dt'"
-        with pytest.raises(UnusableStepError, match=names_second_one):
-            agent.train(vector_class([Courier, WithoutInfo]), steps=10)
+    envs = gym.vector.AsyncVectorEnv(
+        [ForgettingTheLast], autoreset_mode=gym.vector.AutoresetMode.SAME_STEP
+    )
+    with pytest.raises(UnusableStepError, match=r"step 50\b.*got \['job'\]"):
+        agent.train(envs, steps=60)
+    envs.close()
 
 
 def test_values_are_finite_at_the_shortest_and_longest_duration_and_any_discount():
