@@ -206,9 +206,9 @@ class Schedule(Callback):
 
 
 class ProgressBarCallback(Callback):
-    """Shows the bar of one training, with its last returns and evaluation.
+    """Shows a progress bar, with the median of the last returns and the last evaluation.
 
-    It appears after some seconds of a training, by default `SHOWN_AFTER`.
+    It appears after ``seconds`` of a training, by default `SHOWN_AFTER`.
     """
 
     step_interval = 64  # an update costs more than a step
@@ -291,4 +291,5 @@ def _summary_writer() -> Callable[[str], Any]:
 
 
 def _done(training: Training) -> int:
+    """Return the number of steps learned, or of episodes where these are the goal."""
     return training.n_steps if training.steps is not None else training.n_episodes

@@ -35,8 +35,7 @@ from sdnn.training.interfaces import (
 )
 
 _LEARNING, EVALUATION = 0, 1  # purposes of episodes, for `episode_seed`
-
-_ENDLESS = 10_000  # steps after which an episode seems to have no end
+_ENDLESS = 10_000  # warn after this many steps in one episode; a chosen number
 
 _OLD_API = (
     "; an environment of Gym before 0.26 can be wrapped:"
@@ -45,7 +44,10 @@ _OLD_API = (
 
 
 def announces(env: object, what: str) -> bool:
-    """Return whether the metadata of an environment, or a vector, say that infos have something."""
+    """Return whether the metadata of an environment, or a vector, announce an entry of infos.
+
+    ``what`` is ``"action_masks"`` or ``"durations"``.
+    """
     return bool((getattr(env, "metadata", None) or {}).get(what))
 
 
@@ -68,7 +70,7 @@ def mask_in(info: Info) -> Mask:
 
 
 def reset_env(env: AnyEnv, seed: Any, options: Options) -> tuple[Element, Info]:
-    """Reset an environment, or a vector; return what is observed first, and the info.
+    """Reset an environment, or a vector; return the first observation and the info.
 
     UnusableStepError if it returns something else than an observation and a dictionary.
     """
@@ -84,9 +86,9 @@ def reset_env(env: AnyEnv, seed: Any, options: Options) -> tuple[Element, Info]:
 def step_env(env: AnyEnv, action: Element) -> Sequence[Any]:
     """Step an environment, or a vector; UnusableStepError if it does not return five values."""
     made = env.step(action)
-    if (type(made) is tuple or isinstance(made, (tuple, list))) and len(made) == 5:
-        return made
     n = len(made) if isinstance(made, (tuple, list)) else 1
+    if n == 5:
+        return made
     raise UnusableStepError(
         "env.step must return five values, (observation, reward, terminated, truncated, info),"
         f" got {n}{_OLD_API}"
@@ -100,8 +102,7 @@ def checked_outcome(reward: Any, terminated: object, truncated: object) -> tuple
             reward = reward_of(reward)
         if not math.isfinite(reward):
             raise ValueError(f"reward must be finite, got {reward}")
-        if not type(terminated) is bool is type(truncated):
-            terminated, truncated = flag("terminated", terminated), flag("truncated", truncated)
+        terminated, truncated = flag("terminated", terminated), flag("truncated", truncated)
     except (TypeError, ValueError) as error:
         raise UnusableStepError(str(error)) from error
     return reward, terminated, truncated
@@ -114,8 +115,9 @@ class SingleEnvironment(EnvironmentAdapter):
     can_repeat = True
 
     def __init__(self, env: Env) -> None:
-        self._env, space = env, env.action_space
-        is_scalar = isinstance(space, gym.spaces.Box) and space.shape == ()
+        self._env = env
+        is_scalar = isinstance(env.action_space, gym.spaces.Box) and env.action_space.shape == ()
+        # The action of a Box without dimensions is an array, which `copied` would not keep.
         self._copied: Callable[[Element], Element] = np.array if is_scalar else copied
         self.rewards, self.terminated, self.truncated = [0.0], [False], [False]
         self.masks = [None] if announces(env, "action_masks") else None
@@ -131,9 +133,7 @@ class SingleEnvironment(EnvironmentAdapter):
     def take(self, action: Element) -> tuple[Element, float, bool, bool]:
         """Step the environment; return observation, reward, terminated and truncated."""
         observation, reward, terminated, truncated, info = step_env(self._env, self._copied(action))
-        is_usual = type(reward) is float and type(terminated) is bool is type(truncated)
-        if not (is_usual and math.isfinite(reward)):
-            reward, terminated, truncated = checked_outcome(reward, terminated, truncated)
+        reward, terminated, truncated = checked_outcome(reward, terminated, truncated)
         if self.masks is not None:
             self.masks = [None if terminated else mask_in(info)]
         if self.dts is not None:
@@ -218,7 +218,9 @@ class Episodes:
         self.masks: Masks | None = None
         self._environments = list(range(n))
         self._begins_with_step: dict[int, int] = {}
+        """Numbers of the episodes that begin with the next step, by environment."""
         self._n_unpacked = 0
+        """Rounds of steps since recent actions were packed; see `ActionLog`."""
 
     @property
     def learned_before(self) -> list[Statistics]:
@@ -415,33 +417,33 @@ class Episodes:
     def _replay(self) -> None:
         """Take the actions of all present episodes again, so that all end with the same step.
 
-        A vector steps all environments at once. Environments with shorter episodes therefore begin
-        with actions of the longest one, and are reset when their own episode has to begin.
+        A vector steps all environments at once, so shorter episodes begin later. With episodes of 5
+        and 2 steps there are 5 rounds: in rounds 0 to 2 environment 1 takes part with a copy of the
+        longest episode; before round 3 it is reset with the seed of its own episode.
         """
         present = {i: episode for i, episode in enumerate(self.present) if episode is not None}
+        if not present:
+            return
         actions = {i: episode.actions.array() for i, episode in present.items()}
-        n_rounds = max(map(len, actions.values()), default=0)
-        longest = next((i for i, array in actions.items() if len(array) == n_rounds), 0)
+        n_rounds = max(map(len, actions.values()))
+        first_round = {i: n_rounds - len(array) for i, array in actions.items()}
+        longest = next(i for i, first in first_round.items() if first == 0)
         over = set(self._environments)
-        for t in range(n_rounds + bool(actions)):
-            beginning = {i for i, array in actions.items() if n_rounds - len(array) == t}
-            own_episode = beginning.copy()
+        for t in range(n_rounds + 1):  # episodes without actions begin after the last round
+            numbers = {i: present[i].number for i, first in first_round.items() if first == t}
             if t < n_rounds or n_rounds == 0:
-                beginning |= over
-            if beginning:
-                numbers = {
-                    i: present[i if i in own_episode else longest].number for i in sorted(beginning)
-                }
-                self._store_first_observations(self._reset(numbers))
-            if t == n_rounds:  # only episodes without actions begin after the last step
+                numbers = dict.fromkeys(over, present[longest].number) | numbers
+            if numbers:
+                self._store_first_observations(self._reset(dict(sorted(numbers.items()))))
+            if t == n_rounds:
                 return
             self.actions = [
-                actions[i][t - n_rounds]
-                if i in actions and t >= n_rounds - len(actions[i])
+                actions[i][t - first_round[i]]
+                if i in present and t >= first_round[i]
                 else actions[longest][t]
                 for i in self._environments
             ]
             observations = self.adapter.step(self.actions)
             self.previous_observations = self.observations
-            self.observations = self._read("observation", observations)
+            self.observations = self._read("next_observation", observations)
             over = {i for i in self._environments if self.is_over(i)}

@@ -25,12 +25,13 @@ from sdnn.support.files import Arrays, Description, read_file, write_file
 _STATISTICS = ("obs_rms", "return_rms")
 _MOMENTS = ("mean", "var", "count")
 _SUMS = ("discounted_reward", "accumulated_reward")
+"""The running discounted return of NormalizeReward, by its names for environments and vectors."""
 _FEW = 1.0
 """Statistics with a lower count have no observation yet: wrappers begin with a tiny count."""
 
 
 class _Numbers(msgspec.Struct, frozen=True):
-    """An array, whose bytes are text in JSON, which has no NaN."""
+    """An array for JSON: its bytes as text, since JSON's numbers have no NaN."""
 
     dtype: Literal["<f4", "<f8"]
     shape: tuple[int, ...]
@@ -56,26 +57,29 @@ class Statistics(msgspec.Struct, frozen=True):
         ]
 
 
+def _layers_of(env: object) -> Iterator[object]:
+    """Yield an environment's wrappers, the outermost first, and the environment in them."""
+    while env is not None:
+        yield env
+        # Wrappers pass on the attributes of their environment, so that `env.env` may be another's.
+        env = getattr(env, "__dict__", {}).get("env")
+
+
 def learning_wrappers(env: object) -> list[Any]:
     """List the wrappers of an environment, or of a vector, that learn; the outermost first."""
     wrappers = []
-    while env is not None:
-        if any(moments_of(env, name) is not None for name in _STATISTICS):
-            wrappers.append(env)
-        if isinstance(env, gym.vector.SyncVectorEnv):
-            for inner in env.envs:
+    for layer in _layers_of(env):
+        if any(moments_of(layer, name) is not None for name in _STATISTICS):
+            wrappers.append(layer)
+        if isinstance(layer, gym.vector.SyncVectorEnv):
+            for inner in layer.envs:
                 wrappers += learning_wrappers(inner)
-        env = getattr(env, "__dict__", {}).get("env")
     return wrappers
 
 
 def names_of(env: object) -> str:
     """Return the names of all wrappers and of the environment in them."""
-    names = []
-    while env is not None:
-        names.append(type(env).__name__)
-        env = getattr(env, "__dict__", {}).get("env")
-    return ", ".join(names)
+    return ", ".join(type(layer).__name__ for layer in _layers_of(env))
 
 
 def share_statistics(env: object, evaluation_env: object) -> None:
@@ -217,7 +221,6 @@ _BlockLength = Annotated[int, msgspec.Meta(ge=1, le=MOST_IN_BLOCK)]
 _Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
 _Period = Annotated[int, msgspec.Meta(ge=1, le=2**53)]
 
-
 CLASSES: Data = {}
 """The classes of agents, by the name that files have; `sdnn.agents.Agent` adds its subclasses."""
 
@@ -241,7 +244,6 @@ def read_agent(path: Path, *kinds: str) -> tuple[Any, Description, Arrays]:
 
 _SCALARS = (np.generic, int, float)
 """Immutable types of observations and actions, which need no copy."""
-
 
 MOST_RECENT = 1024  # rounds of steps after which the recent actions of all episodes become arrays
 
@@ -276,9 +278,9 @@ class ActionLog:
 class SavedEpisode(msgspec.Struct, frozen=True, kw_only=True):
     """The present episode in one environment.
 
-    ``number`` counts all that have begun; ``waits`` is whether the last action's outcome is still
-    to be learned; ``actions`` are those taken, shape (n, ...); ``observation`` is the last one,
-    flattened.
+    ``number`` counts all that have begun; ``waits`` is whether its last step is not learned yet;
+    ``actions`` are those taken, shape (n_steps, ...); ``observation`` is the last one, flattened,
+    shape (n_variables,). Both arrays are stored apart from the rest, which is JSON.
     """
 
     number: _Count
@@ -389,13 +391,12 @@ def read_training(path: Path) -> tuple[Any, SavedTraining]:
         saved = msgspec.convert(description.get("training"), SavedTraining)
     except msgspec.ValidationError as error:
         raise ValueError(f"{path} is damaged: training: {error}") from None
-    episodes = [
-        episode  # None: no episode has begun in this environment
-        and msgspec.structs.replace(
-            episode,
-            actions=actions(f"{_ARRAYS_OF_TRAINING}{i}.actions"),
-            observation=array(f"{_ARRAYS_OF_TRAINING}{i}.observation"),
-        )
-        for i, episode in enumerate(saved.present)
-    ]
-    return agent, msgspec.structs.replace(saved, present=episodes)
+    present = list(saved.present)
+    for i, episode in enumerate(present):
+        if episode is not None:
+            present[i] = msgspec.structs.replace(
+                episode,
+                actions=actions(f"{_ARRAYS_OF_TRAINING}{i}.actions"),
+                observation=array(f"{_ARRAYS_OF_TRAINING}{i}.observation"),
+            )
+    return agent, msgspec.structs.replace(saved, present=present)

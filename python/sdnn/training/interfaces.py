@@ -18,12 +18,18 @@ from sdnn.support.arguments import explains_names, shown
 from sdnn.support.habits import advice
 
 Seeds: TypeAlias = Mapping[int, int | None]
+"""The seed of a reset in each environment that is reset; None: a reset without a seed."""
 Options: TypeAlias = Data | None
+"""The options of a reset."""
 
 LONG = 2_000
 """Steps in each environment after which a training without a terminated episode is a long one."""
 _LARGEST_DISCOUNT = 0.998
-"""Largest discount with which values are learned reliably where nothing terminates."""
+"""Largest discount with which values are learned reliably where nothing terminates.
+
+Chosen below 0.999, with which Pendulum's median return of five seeds after 60,000 steps fell from
+-173 (0.99) to -286; docs/how-to/choosing-settings.md.
+"""
 
 
 class UnusableStepError(ValueError):
@@ -50,20 +56,23 @@ def missing_in_info(key: str, keys: Iterable[object], where: str = "info") -> Un
 class EnvironmentAdapter(abc.ABC):
     """The interface of all environments, single and vectorized.
 
-    ``can_repeat`` is whether each environment can be reset at any time, with a seed of its own.
-    ``rewards``, ``terminated`` and ``truncated`` are those of the last step in each. ``masks`` are
-    those of the actions allowed after the last reset or step in each, None where it has none; None
-    altogether where its metadata have no ``"action_masks"``. ``dts`` are the durations of the last
-    step in each, NaN where the environment gave none; None altogether without ``"durations"``.
+    Lists have an entry for each environment.
     """
 
     n_environments: int
     can_repeat: bool
+    """Whether each environment can be reset at any time, with a separate seed."""
     rewards: list[float]
+    """Rewards of the last step, finite."""
     terminated: list[bool]
     truncated: list[bool]
     masks: list[Mask] | None
+    """Masks of the actions that are allowed after the last step or reset, None in terminal states.
+
+    None altogether where the environment's metadata have no ``"action_masks"``.
+    """
     dts: list[float] | None
+    """Durations of the last step; None altogether without ``"durations"`` in the metadata."""
 
     @abc.abstractmethod
     def __init__(self, env: Any) -> None: ...
@@ -139,7 +148,11 @@ class ObservingLearner(Protocol):
 
 
 class CoreParts(NamedTuple):
-    """The C++ object of an agent, and the functions that make what it takes."""
+    """The C++ object of an agent, and the functions that make what it takes.
+
+    ``read`` makes rows of observed variables from observations, and ``mask`` flags from a mask; the
+    name before them is for errors. ``batch`` makes an array of actions, with zeros for None.
+    """
 
     core: Controller
     read: Callable[[str, Elements], NDArray[np.float64]]
@@ -181,17 +194,18 @@ class Advised:
 
         def __getattr__(self, name: str) -> object:
             """Suggest the right name for an attribute that other libraries' agents have."""
-            kind = type(self)
-            if not name.startswith("_") and not hasattr(kind, name):
+            agent_class = type(self)
+            if not name.startswith("_") and not hasattr(agent_class, name):
                 elsewhere = {
                     field.name: f"{part}.{field.name}"
                     for part in ("approximator", "learning")
-                    for field in fields_of(getattr(kind, f"{part}_type"))
+                    for field in fields_of(getattr(agent_class, f"{part}_type"))
                 }
-                elsewhere |= {known: known for known in dir(kind) if not known.startswith("_")}
-                del elsewhere["progress"]  # where others show a progress bar, it is a schedule's
+                elsewhere |= {public: public for public in dir(agent_class) if public[0] != "_"}
+                # Names like `progress_bar` must not lead to the progress of schedules.
+                del elsewhere["progress"]
                 if hint := advice(name, (), elsewhere):
-                    raise AttributeError(f"{kind.__name__} has no {name}: {hint}")
+                    raise AttributeError(f"{agent_class.__name__} has no {name}: {hint}")
             return object.__getattribute__(self, name)  # raises its own error
 
 

@@ -32,7 +32,9 @@ from sdnn.training.loop import Row, TrainingLoop, learner_adapter
 _SETTINGS = (
     "seed", "evaluate_every", "evaluate_every_episodes", "evaluation_episodes", "limit_bootstraps"
 )  # fmt: skip
-_STATE = ("n_steps", "n_episodes", "n_rows", "evaluations")  # attributes that are saved as they are
+"""Arguments that are saved, besides the goal."""
+_STATE = ("n_steps", "n_episodes", "n_rows", "evaluations")
+"""Attributes that are saved as they are."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -361,6 +363,7 @@ class Training(TrainingLoop):
         for name in _STATE:
             setattr(training, name, getattr(saved, name))
         training.blocks = {block.length: block for block in saved.blocks}
+        # A repeated episode begins with the statistics that wrappers had before it.
         learned = saved.wrappers if does_repeat else agent.wrappers
         is_same = take_statistics(training._episodes.wrappers, learned)
         if does_repeat:
@@ -414,7 +417,7 @@ class CheckpointCallback(Callback):
 
 
 def _optional(name: str, value: float | None) -> int | None:
-    """Check a number of steps or episodes, which may be None, or a float that is whole."""
+    """Return a number of steps or episodes as an int; it may be None, or a float that is whole."""
     if isinstance(value, float) and value.is_integer():  # such as 1e5
         value = int(value)
     return None if value is None else whole(name, value, 1, 2**53)

@@ -58,11 +58,14 @@ class _SyncEnvironments(EnvironmentAdapter):
         return self._converted(observations)
 
     def _call_each(
-        self, numbers: Iterable[int], call: Callable[[SingleEnvironment, int], Any]
+        self, environments: Iterable[int], call: Callable[[SingleEnvironment, int], Any]
     ) -> list[Any]:
-        """Return the results of a function for each environment; errors name the environment."""
+        """Call a function for each of the environments; return its results.
+
+        Then store the masks and durations of all. Errors name the environment.
+        """
         results = []
-        for i in numbers:
+        for i in environments:
             try:
                 results.append(call(self._adapters[i], i))
             except UnusableStepError as error:
@@ -79,11 +82,8 @@ class _SyncEnvironments(EnvironmentAdapter):
         Observations that do not fit are returned unchanged: the agent's error names them.
         """
         space, dtype = self._space, self._space.dtype
-        for observation in observations:
-            if type(observation) is not ndarray or observation.dtype is not dtype:
-                break
-        else:
-            return observations  # all have the type already
+        if all(type(x) is ndarray and x.dtype is dtype for x in observations):
+            return observations
         if any(has_mask(space, observation) for observation in observations):
             return observations  # the vector's arrays would drop the mask of a masked array
         batch: Any = create_empty_array(space, len(observations))
@@ -107,7 +107,11 @@ class _Vector(EnvironmentAdapter, abc.ABC):
         """Environments in which the next step is a reset, whose info has no duration."""
 
     def _step(self, actions: Elements) -> tuple[Elements, Elements]:
-        """Step; return the observations, and those after resets (mode ``SAME_STEP``)."""
+        """Step all environments, and store the outcome.
+
+        Returns the observations after the step, where an episode ended its last one; and those
+        after the resets of mode ``SAME_STEP``, in other modes the same ones.
+        """
         batch, rewards, terminated, truncated, infos = step_env(self._env, self._batch(actions))
         observations = _split_batch(self._env, batch)
         self.rewards = self._column("reward", rewards, "fiub", "numbers")
@@ -129,10 +133,14 @@ class _Vector(EnvironmentAdapter, abc.ABC):
         return observations, observations
 
     def _take_masks(self, infos: Info, terminated: Sequence[bool], ended: Sequence[bool]) -> None:
-        """Store the masks after a step; where an episode ended, the mask of its last state."""
+        """Store the masks after a step; where an episode ended, the mask of its last state.
+
+        A terminal state needs none. In mode ``SAME_STEP`` infos belong to the next episode where
+        one has ended, and ``final_info`` to the last state.
+        """
         if self.masks is None:
             return
-        resets = self._mode == "SAME_STEP"  # infos then belong to the next episodes
+        resets = self._mode == "SAME_STEP"
         masks = self._masks_in(infos, [resets or not is_terminal for is_terminal in terminated])
         self._begun = list(masks)
         if resets and any(ended):
@@ -144,7 +152,7 @@ class _Vector(EnvironmentAdapter, abc.ABC):
     def _durations_in(self, infos: Info, ended: Sequence[bool]) -> list[float]:
         """Return the durations of the last step; UnusableStepError if one is missing.
 
-        With autoreset in the same step, those of last steps are in ``final_info``.
+        In mode ``SAME_STEP`` those of steps that end an episode are in ``final_info``.
         """
         is_final = [self._mode == "SAME_STEP" and has_ended for has_ended in ended]
         dts = self._dt_column(infos, [not is_last for is_last in is_final])
@@ -155,7 +163,7 @@ class _Vector(EnvironmentAdapter, abc.ABC):
 
     def _dt_column(self, infos: Info, needed: Sequence[bool]) -> list[float]:
         """Return the numbers ``dt`` in infos, 1 where not needed, also in the step of a reset."""
-        needed = [n and i not in self._resetting for i, n in enumerate(needed)]
+        needed = [is_needed and i not in self._resetting for i, is_needed in enumerate(needed)]
         if not any(needed):
             return [1.0] * self.n_environments
         self._require_key("dt", infos, needed)
@@ -201,11 +209,14 @@ class _Vector(EnvironmentAdapter, abc.ABC):
         batch: Any = create_empty_array(space, self.n_environments)
         return concatenate(space, actions, batch)
 
-    def _column(self, name: str, values: object, kinds: str, what: str) -> list[Any]:
-        """Return a list with a value for each environment; UnusableStepError for anything else."""
+    def _column(self, name: str, values: object, types: str, what: str) -> list[Any]:
+        """Return a list with a value for each environment; UnusableStepError for anything else.
+
+        ``types`` and ``what`` are those of `array_of`: possible types, and their word for errors.
+        """
         what = f"{self.n_environments} {what}"
         try:
-            column = array_of(name, values, kinds, what)
+            column = array_of(name, values, types, what)
         except ValueError as error:
             raise UnusableStepError(f"env.step must return arrays: {error}") from None
         if column.shape != (self.n_environments,):
