@@ -107,7 +107,7 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
     """
 
     _has_warned_of_history = False
-    _returns: Sequence[float] = ()  # of the episodes of all calls of `train`; not in files
+    _returns: Sequence[float] = ()  # of the episodes of all calls of `train`; not saved in files
 
     @property
     def observation_range(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -146,6 +146,7 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
         return len(self._action.low)
 
     def _dimension(self, dimension: int) -> int:
+        """Return the number of a dimension of actions as an int; ValueError if there is none."""
         return whole("dimension", dimension, 0, self.n_dimensions - 1)
 
     def _warn_of_history(self) -> None:
@@ -166,7 +167,7 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
         )
 
     def _imitate_step(self, transition: Transition, value: float, margin: float) -> None:
-        """Learn that a teacher chose an action whose return was `value`; see `imitate`.
+        """Learn that a teacher chose an action whose return was `value`; `imitate` calls it.
 
         With Q(lambda) the values of other actions become lower by `margin` at least, in the unit of
         the rewards. RuntimeError while the agent is warming up; ValueError for bad arguments and
@@ -176,7 +177,7 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
         self._require_warm().imitate(observation, action, value, margin)
 
     def _follow_teacher(self, transition: Transition) -> None:
-        """Continue an episode with a teacher's action, and learn nothing."""
+        """Continue an episode with a teacher's action, so that histories know it; learn nothing."""
         observation, action, *_ = self._parts_of(transition, 0)
         self._require_warm().follow_teacher(observation, action)
 
@@ -187,9 +188,7 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
 
     @property
     def _n_warm_up_steps_left(self) -> int:
-        """Number of transitions until the warm-up is over; 0 without a warm-up."""
-        if not self.is_warming_up:
-            return 0
+        """Number of transitions until the warm-up is over, while the agent is warming up."""
         return self._warm_up_steps - len(self.state()["warm_up.rewards"])
 
     def _end_warm_up_of_teacher(self) -> None:
@@ -207,7 +206,10 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
         return self._controller
 
     def _values(self, observation: Element, dimension: int) -> NDArray[np.float64]:
-        """Return the values of a dimension's actions; fuzzy rules give the observation's value."""
+        """Return the values of a dimension's actions, or an actor-critic's probabilities.
+
+        Shape (n_actions[dimension],); fuzzy rules give the observation's value, shape (1,).
+        """
         variables = self._observations.vector("observation", observation)
         return self._require_warm().values(variables, dimension)
 
@@ -256,18 +258,17 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
         The action, or an array of actions along the first axis, and None.
         """
         explore = not flag("deterministic", deterministic)
-        several = unbatched(self.observation_space, observation)
-        if several is None:
+        batch = unbatched(self.observation_space, observation)
+        if batch is None:  # a single observation
             return self._masked_action(observation, explore, action_masks), None
-        require(len(several) > 0, "observation", "be at least one", observation)
-        masks = [None] * len(several) if action_masks is None else action_masks
-        are_as_many = hasattr(masks, "__len__") and len(masks) == len(several)
-        expected = f"be one for each of {len(several)} observations"
-        require(are_as_many, "action_masks", expected, action_masks)
-        pairs = zip(several, masks, strict=True)
-        return np.stack(
-            [self._masked_action(element, explore, mask) for element, mask in pairs]
-        ), None
+        require(len(batch) > 0, "observation", "be at least one", observation)
+        masks = [None] * len(batch) if action_masks is None else action_masks
+        has_all_masks = hasattr(masks, "__len__") and len(masks) == len(batch)
+        expected = f"be one for each of {len(batch)} observations"
+        require(has_all_masks, "action_masks", expected, action_masks)
+        pairs = zip(batch, masks, strict=True)
+        actions = [self._masked_action(element, explore, mask) for element, mask in pairs]
+        return np.stack(actions), None
 
     def _masked_action(self, observation: Element, explore: bool, mask: Mask) -> Element:
         """Choose an action as `act` does; errors about the mask name the argument of `predict`."""
@@ -341,6 +342,8 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
     ) -> Figure:
         """Draw the values of states over one or two inputs, the others at their median.
 
+        The figure is one of Matplotlib, as with `plot_policy` and `plot_inputs`.
+
         Parameters
         ----------
         source : environment, or list of observations
@@ -349,10 +352,6 @@ class Agent(Displayed, BaseAgent[Approximator, Learning]):
             Names of inputs, or numbers of observed variables; by default the most influential ones.
         seed : int
             Of the episodes and of the shuffling.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
         """
         from sdnn.agents.inspection_figures import plot_values
 

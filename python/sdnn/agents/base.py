@@ -61,7 +61,10 @@ Learning = TypeVar("Learning")
 
 
 def presets_of(listed: Mapping[str, tuple[Any, ...]]) -> Mapping[str, Preset]:
-    """Return presets by name; the core has title, both parts, and perhaps observations of each."""
+    """Make presets from those of the core, by name.
+
+    Each is a tuple of title, approximator, learning and perhaps settings of observations.
+    """
     presets = {}
     for name, settings in listed.items():
         observed = settings[3] if len(settings) > 3 else _core.ObservationConfig()
@@ -92,7 +95,7 @@ class BaseAgent(Advised, abc.ABC, Generic[Approximator, Learning]):
     _controller: _core.Controller
     _scaling: Scaling | None = None
     _next_episode = 0  # number of the next episode of `train` without a seed
-    _has_warned = False
+    _has_warned = False  # whether a warning named a refused reward
     has_bounds = True
     """Whether the spaces have an environment's bounds; False for agents made in C++ from ranges."""
 
@@ -129,8 +132,8 @@ class BaseAgent(Advised, abc.ABC, Generic[Approximator, Learning]):
             seed,
             warm_up_steps,
         )
-        has_code = isinstance(missing, str) and missing == "code"
-        default_history = "none" if has_code else chosen.history
+        codes_missing = isinstance(missing, str) and missing == "code"
+        default_history = "none" if codes_missing else chosen.history
         self._observation = self._observations.config(
             chosen.observation_range if observation_range is None else observation_range,
             angles,
@@ -241,6 +244,7 @@ class BaseAgent(Advised, abc.ABC, Generic[Approximator, Learning]):
         self._controller.n_environments = whole("n_environments", n, 1, _MOST_ENVIRONMENTS)
 
     def _check_environment(self, environment: int) -> None:
+        """Raise ValueError unless there is an environment of this number."""
         if type(environment) is not int or environment:  # fast path: most agents have only 0
             whole("environment", environment, 0, self.n_environments - 1)
 
@@ -372,6 +376,7 @@ class BaseAgent(Advised, abc.ABC, Generic[Approximator, Learning]):
 
         None where a subclass or user has replaced `act` or `learn`, which must be called then.
         """
+        # A bound method has its function in `__func__`; something that a user has set may lack it.
         functions = [getattr(method, "__func__", None) for method in (self.act, self.learn)]
         if functions != [BaseAgent.act, BaseAgent.learn]:
             return None
@@ -398,13 +403,14 @@ class BaseAgent(Advised, abc.ABC, Generic[Approximator, Learning]):
         write_file(path_of("path", path), "agent", self.state(), self.description())
 
     def description(self) -> Description:
-        """Return the settings, from which `rebuild` makes an agent like this one."""
+        """Return the settings; `rebuild` makes an equal agent from them and `state`."""
         more: Description = {} if self.scaling is None else {"scaling": self.scaling.values()}
         if self.wrappers:
             more["wrappers"] = msgspec.to_builtins(self.wrappers)
         if self._next_episode:
             more["next_episode"] = self._next_episode
-        more |= {"action_masks": True} if self._actions.has_masks else {}
+        if self._actions.has_masks:
+            more["action_masks"] = True
         if self.has_bounds:
             more["observation_space"] = space_data(self.observation_space)
             more["action_space"] = space_data(self.action_space)

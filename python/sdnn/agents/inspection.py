@@ -26,12 +26,13 @@ Flags: TypeAlias = NDArray[np.bool_]
 AnyAgent: TypeAlias = BaseAgent[Any, Any]
 InputType: TypeAlias = Literal["variable", "circular", "angle", "symbol"]
 
+# Chosen numbers, not measured ones.
 MOST_STATES = 1_000  # largest number of states from which influences are estimated
 MOST_READS, MOST_SLOW_READS = 40_000, 10_000
 """Number of reads for influences, and of agents with slower networks: inputs share them."""
 MOST_STEPS = 2_000  # steps in which states are met
 SHARE_RANDOM = 0.1  # share of random actions with which states are met beside the greedy path
-N_SHUFFLES = 2
+N_SHUFFLES = 2  # how often each input is shuffled
 
 
 @dataclass(frozen=True)
@@ -120,11 +121,12 @@ def inputs_of(agent: AnyAgent) -> list[AgentInput]:
     """
     require_learned(agent)
     names = variable_names(agent.observation_space)
-    groups = {first: n for first, n in agent._observation.symbols}
+    n_values_of = {first: n for first, n in agent._observation.symbols}  # by the first variable
     inputs: list[AgentInput] = []
     for input_type, variables in agent._controller.inputs:
         if input_type == "symbol":
-            inputs.append(_symbol(names, variables[0], variables[1]))
+            first, n_values = variables
+            inputs.append(_symbol(names, first, n_values))
         elif input_type == "angle":
             name = f"angle of {names[variables[0]]} and {names[variables[1]].split()[-1]}"
             inputs.append(AgentInput(name, "angle", tuple(variables)))
@@ -135,8 +137,8 @@ def inputs_of(agent: AnyAgent) -> list[AgentInput]:
     inside = {column for agent_input in inputs for column in agent_input.columns}
     column = 0
     while column < len(names):
-        n_variables = groups.get(column, 1)
-        if column not in inside and column in groups:
+        n_variables = n_values_of.get(column, 1)
+        if column not in inside and column in n_values_of:
             inputs.append(_symbol(names, column, n_variables, is_used=False))
         elif column not in inside:
             inputs.append(AgentInput(names[column], "variable", (column,), is_used=False))
@@ -210,7 +212,7 @@ class Reader:
         """The name of the values of states."""
         return "V(s)" if self._has_state_values else "max Q(s, a)"
 
-    def forget(self) -> None:
+    def begin_episode(self) -> None:
         """Begin a greedy episode: the next state counts as its first observation."""
         self.agent.begin_greedy_episode()
 
@@ -223,7 +225,7 @@ class Reader:
 
         Of several best actions it is the first, so that equal values give equal actions.
         """
-        self.forget()
+        self.begin_episode()
         # For each state and dimension of the action: the values of all actions.
         all_parts = [self._parts(state) for state in states.rows]
         masks = [None] * len(all_parts) if states.allowed is None else list(states.allowed)
@@ -264,7 +266,7 @@ class Reader:
 
     def _act(self, state: Floats, mask: Flags | None) -> Floats:
         """Return the greedy action in a state as the first of an episode."""
-        self.forget()
+        self.begin_episode()
         allowed = None if mask is None else mask.astype(np.uint8)
         return np.ravel(self._core.act(state, False, 0, allowed))
 
@@ -332,10 +334,11 @@ def meet_states(agent: AnyAgent, env: Env, seed: int = 0, options: Data | None =
             if len(watched.states) == MOST_STEPS:
                 break
         number += 1
-    sizes = [mask.size for mask in watched.masks if mask is not None]
-    # A state without a mask allows all actions; without any mask the list is empty.
-    masks = [np.ones(sizes[0], np.bool_) if m is None else m for m in watched.masks if sizes]
-    states = States(np.array(watched.states), np.array(masks) if masks else None)
+    allowed = None
+    if any(mask is not None for mask in watched.masks):
+        all_actions = np.ones(sum(agent._controller.n_actions), np.bool_)
+        allowed = np.array([all_actions if mask is None else mask for mask in watched.masks])
+    states = States(np.array(watched.states), allowed)
     states = states.chosen(np.isfinite(states.rows).all(axis=1))
     require(len(states.rows) > 1, "env", "give observations without missing readings", env)
     return states.thinned(MOST_STATES)

@@ -34,8 +34,14 @@ NAMES: Mapping[str, tuple[str, ...]] = {
 """Usual names of columns, and their names in D4RL, imitation and Stable-Baselines3."""
 
 _IGNORED = re.compile(r"(infos?|metadata|id|seed|total_steps)\b")
+"""Names of columns that logs have beside transitions."""
 _NUMBERED = re.compile(r"(.+?)[_.\[](\d+)\]?")
-_ARRAYS = ("observations", "actions", "rewards")
+"""Name and number of a column, such as ``observation_0``, ``observation.0``, ``observation[0]``."""
+_REQUIRED = ("observations", "actions", "rewards")
+_ITEMS_OF_TUPLE = (
+    "observations", "actions", "rewards", "next_observations", "terminations", "truncations"
+)  # fmt: skip
+"""The columns in the order of a transition's tuple."""
 
 
 class Logged(NamedTuple):
@@ -112,7 +118,7 @@ def _table_lines(path: Path) -> Iterator[tuple[str, Data]]:
         if not names:
             names, where = [cell.strip() for cell in cells], f"dataset, line {number}"
             require(len({*names}) == len(names), where, "have different names of columns", names)
-            _columns_of({name: [0.0] for name in names}, where)  # the line of names is refused here
+            _columns_of({name: [0.0] for name in names}, where)  # refuses unknown names
             continue
         expected = f"have {len(names)} cells, as many as there are names"
         require(len(cells) == len(names), f"dataset, line {number}", expected, cells)
@@ -126,16 +132,17 @@ def _with_next_observations(
 ) -> Iterator[Logged]:
     """Convert rows, of one or several episodes, to transitions.
 
-    A missing next observation is that of the next row. So the last step of a truncated episode has
-    none, and is left out, unless the rows have the episode's last observation (`is_episode`).
+    A missing next observation is the observation of the next row. The last step of a truncated
+    episode has none, and is left out, unless the rows are those of an episode (`is_episode`), in
+    which a last row has the observation alone.
     """
-    pending: tuple[Data, str] | None = None  # the last row and its place, without that observation
+    pending: tuple[Data, str] | None = None  # the row before, which lacks it, and its place
     for place, row in rows:
         if pending is not None:
             pending[0]["next_observations"] = row["observations"]
             yield _logged(*pending)
             pending = None
-        if "rewards" not in row:  # only the observation after the last step
+        if "rewards" not in row:  # the row of the observation after the last step
             continue
         if "next_observations" in row:
             yield _logged(row, place)
@@ -144,15 +151,12 @@ def _with_next_observations(
         if is_episode or not (is_terminated or is_truncated):
             pending = row, place
         elif is_terminated:
-            row["next_observations"] = row["observations"]  # not used: no value follows
+            row["next_observations"] = row["observations"]  # any: no value follows
             yield _logged(row, place)
 
 
 def _parse_cell(text: str) -> Any:
-    """Return the bool or the number that a cell of a CSV file spells, or its text.
-
-    An empty cell is NaN, a missing reading.
-    """
+    """Return the bool or number in a cell of a CSV file, or its text; NaN for an empty one."""
     word = text.strip() or "nan"
     if word.lower() in ("true", "false"):
         return word.lower() == "true"
@@ -183,7 +187,7 @@ def _transitions_of_items(items: Iterable[Any]) -> Iterator[Logged]:
         if isinstance(item, Transition):
             yield Logged(f"transition {number}", item, False)
         elif isinstance(item, tuple | list) and len(item) in (5, 6):
-            yield _logged(dict(zip(_ROW, item, strict=False)), f"transition {number}")
+            yield _logged(dict(zip(_ITEMS_OF_TUPLE, item, strict=False)), f"transition {number}")
         else:
             values = _columns_in(item)
             if values is None:
@@ -200,9 +204,6 @@ def _transitions_of_items(items: Iterable[Any]) -> Iterator[Logged]:
                 columns = _columns_of(values, f"dataset, episode {number}", is_episode=True)
                 rows = _rows(columns, f"episode {number}, step", is_episode=True)
                 yield from _with_next_observations(rows, is_episode=True)
-
-
-_ROW = ("observations", "actions", "rewards", "next_observations", "terminations", "truncations")
 
 
 def _columns_in(item: Any) -> Data | None:
@@ -232,7 +233,7 @@ def _row_of(values: Info, place: str) -> Data:
         require(column, f"dataset, {place}", f"have no {name!r}: {advice(name, NAMES)}", [*values])
         require(column not in row, f"dataset, {place}", f"have {column} once", [*values])
         row[str(column)] = value
-    missing = [name for name in _ARRAYS if name not in row]
+    missing = [name for name in _REQUIRED if name not in row]
     require(not missing, f"dataset, {place}", f"have {', '.join(missing)}", [*values])
     return row
 
@@ -244,10 +245,10 @@ def _logged(row: Info, place: str) -> Logged:
         dt = duration_of(row.get("dts", 1.0))
     except ValueError as error:
         raise ValueError(f"dataset, {place}: {error}") from error
-    is_end = terminated and not truncated
-    observation, action, reward, following = (row[name] for name in _ROW[:4])
+    observation, action, reward, next_observation = (row[name] for name in _ITEMS_OF_TUPLE[:4])
+    is_end = terminated and not truncated  # `dones` of other libraries count time limits as ends
     mask = row.get("next_masks")
-    transition = Transition(observation, action, reward, following, is_end, mask, dt)
+    transition = Transition(observation, action, reward, next_observation, is_end, mask, dt)
     return Logged(place, transition, truncated)
 
 
@@ -271,8 +272,9 @@ def _flag(name: str, value: Any) -> bool:
 def _columns_of(values: Info, where: str = "dataset", *, is_episode: bool = False) -> Data:
     """Return arrays of n rows by their usual names; ``observations`` may have n + 1 rows.
 
-    Those of an episode (`is_episode`) must have n + 1. Columns such as ``observation_0`` are put
-    together. Memory-mapped arrays stay on disk.
+    Those of an episode (`is_episode`) must have n + 1, unless there are ``next_observations``.
+    Columns such as ``observation_0`` are put together. Memory-mapped arrays stay on disk. ``where``
+    is the place for errors.
     """
     columns: Data = {}
     numbered_columns: dict[str, dict[int, Any]] = {}  # such as observation_0, by name and number
@@ -295,7 +297,7 @@ def _columns_of(values: Info, where: str = "dataset", *, is_episode: bool = Fals
         expected = f"have columns of {name} numbered from 0"
         require([*sorted(numbers)] == [*range(len(numbers))], where, expected, sorted(numbers))
         columns[name] = np.stack([numbers[i] for i in range(len(numbers))], axis=-1)
-    missing = [name for name in _ARRAYS if name not in columns]
+    missing = [name for name in _REQUIRED if name not in columns]
     require(not missing, where, f"have {', '.join(missing)}", [*values])
     n = _n_rows_of(columns["rewards"])
     lengths = {name: _n_rows_of(column) for name, column in columns.items()}
@@ -333,9 +335,10 @@ def _n_rows_of(column: Any) -> int:
 
 
 def _rows(columns: Data, place: str, *, is_episode: bool = False) -> Iterator[tuple[str, Data]]:
-    """Yield the rows of arrays with their places; last, an observation that follows them.
+    """Yield the rows of arrays with their places, such as "row 3" (`place` is "row").
 
-    The last step of an episode (`is_episode`) is truncated, unless it terminates.
+    Where there is an observation more than rewards, the last row has only that. The last step of an
+    episode (`is_episode`) is truncated, unless it terminates.
     """
     n, has_next = _n_rows_of(columns["rewards"]), "next_observations" in columns
     for i in range(n if has_next else _n_rows_of(columns["observations"])):

@@ -89,11 +89,11 @@ class ValueAgent(Agent[Approximator, Learning], abc.ABC, Generic[Approximator, L
         dict
             ``left_out``: numbers of the observed variables that are in no input, as neither rewards
             nor actions have to do with them; ``fitted``: those whose ranges the warm-up fitted;
-            ``share_of_range``: for each observed variable the
-            part of its range that nine tenths of the last 2,048 observations or so were in (a small
-            one: ranges are too wide); ``share_beyond_range``: how often it was outside (a large
-            one: too narrow). Both are None for angles, symbols and variables that are left out, and
-            for about 160 observations.
+            ``share_of_range``: for each observed variable the part of its range in which nine
+            tenths of the last 2,048 observations or so were (a small one: ranges are too wide);
+            ``share_beyond_range``: the share of them outside (a large one: too narrow). Both are
+            None for angles, symbols and variables that are left out, and until there were about
+            160 observations.
 
         Raises
         ------
@@ -102,9 +102,13 @@ class ValueAgent(Agent[Approximator, Learning], abc.ABC, Generic[Approximator, L
         """
         controller = self._require_warm()
         use = controller.range_use()
-        read: set[int] = set()  # variables that the agent's inputs read; a symbol is [first, n]
+        read: set[int] = set()  # numbers of the variables in inputs
         for kind, variables in controller.inputs:
-            read.update(range(variables[0], sum(variables)) if kind == "symbol" else variables)
+            if kind == "symbol":
+                first, n_variables = variables
+                read.update(range(first, first + n_variables))
+            else:
+                read.update(variables)
         ranges = zip(*controller.ranges, strict=True)
         declared = list(zip(self._observation.low, self._observation.high, strict=True))
         return {

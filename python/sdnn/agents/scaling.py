@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from sdnn.environments.types import Data
 from sdnn.support.arguments import real, require, whole
 
+_MOST_IN_LINE = 8  # ranges in the description of a scaling; a chosen number
+
 
 def neighbours(n_variables: int, n_redundant: int) -> Iterator[tuple[int, int]]:
     """Yield the pairs of neighbouring variables whose means are the redundant variables.
@@ -58,10 +60,12 @@ class Scaling:
 
     def words(self) -> str:
         """Describe the scaling in a line."""
-        most = 8  # ranges that have room in a line
         ranges = [f"{i} from {low:.6g} to {high:.6g}" for i, (low, high) in enumerate(self.ranges)]
-        text = ", ".join(ranges[:most]) + (", ..." if len(ranges) > most else "")
-        return text + (f", and means of neighbours ({self.n_redundant})" * (self.n_redundant > 0))
+        if len(ranges) > _MOST_IN_LINE:
+            ranges[_MOST_IN_LINE:] = ["..."]
+        if self.n_redundant:
+            ranges.append(f"and means of neighbours ({self.n_redundant})")
+        return ", ".join(ranges)
 
     def lines(self) -> Iterator[str]:
         """Describe each observed variable in a line."""

@@ -12,20 +12,21 @@ from sdnn.agents.inspection import Floats
 from sdnn.agents.q_lambda import SDNNQLambda
 from sdnn.agents.q_learning import ValueAgent
 
-_N_LEARNED = "agent.n_learned"
+_N_LEARNED = "agent.n_learned"  # the number of steps in the state of agents with `schedule_steps`
 
 
-class Schedule(NamedTuple):
+class RateCurves(NamedTuple):
     """Epsilon and alpha at points of a training, each (n,)."""
 
     epsilon: Floats
     learning_rate: Floats
 
 
-def schedule_of(agent: ValueAgent[object, object], steps: Floats, progress: Floats) -> Schedule:
-    """Return the schedule of an agent's settings at numbers of steps and their progress, (n,) each.
+def schedule_of(agent: ValueAgent[object, object], steps: Floats, progress: Floats) -> RateCurves:
+    """Return the scheduled rates at numbers of steps and their progress, each of shape (n,).
 
-    A small agent with the same settings computes it, so values that a user has set are not in it.
+    An agent with the same settings, but a single input, computes them, so that the agent itself
+    stays as it is. Rates that a user has set are not in them.
     """
     learning = agent.learning
     if isinstance(agent, SDNNQLambda):
@@ -48,4 +49,4 @@ def schedule_of(agent: ValueAgent[object, object], steps: Floats, progress: Floa
             small._controller.restore(state | {_N_LEARNED: n_learned})
         small.progress = min(1.0, done)
         epsilon[i], learning_rate[i] = small.epsilon, small.learning_rate
-    return Schedule(epsilon, learning_rate)
+    return RateCurves(epsilon, learning_rate)
