@@ -143,9 +143,7 @@ def test_evaluations_end_in_a_dead_end():
 @pytest.mark.parametrize("agent_class", [SDNNQLambda, Overriding])
 def test_a_dead_end_in_which_an_episode_continues_is_an_unusable_step(agent_class):
     for env in (DeadEnds("continues"), gym.vector.SyncVectorEnv([lambda: DeadEnds("continues")])):
-        with pytest.raises(
-            UnusableStepError, match=r"step 3 of episode 0.*mask must be of 0"
-        ):
+        with pytest.raises(UnusableStepError, match=r"step 3 of episode 0.*mask must be of 0"):
             new_agent(agent_class).train(env, steps=10)
 
 

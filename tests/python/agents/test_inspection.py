@@ -148,7 +148,7 @@ def test_an_angle_is_one_input_in_degrees():
     line = map_of(Reader(agent), states, [angle], inputs)
     degrees, actions = line.axes[0], line.actions[:, 0]
     assert (degrees[0], degrees[-1]) == (-180.0, 180.0)
-    # Action 1 is right where the sine is positive; angles near its zeros are left out.
+    # Action 1 is rewarded where the sine is positive; angles near its zeros are left out.
     assert (actions[(degrees > 20) & (degrees < 160)] == 1.0).mean() > 0.9
     assert (actions[(degrees > -160) & (degrees < -20)] == 0.0).mean() > 0.9
     placed = states.rows[:3].copy()
@@ -165,7 +165,7 @@ def test_a_reader_returns_the_values_and_greedy_actions_of_the_agents_methods(ag
     options = {} if agent_class in (RBFQLearning, FuzzyQLearning) else WITHOUT_SEARCH
     agent = agent_class(env, seed=1, **options)
     agent.train(env, steps=600)
-    states = meet_states(agent, env).thinned(20)  # 20 of them
+    states = meet_states(agent, env).thinned(20)
     reading = Reader(agent).read(states)
     assert reading.allowed.all()
     columns = states.rows, reading.action_values, reading.values, reading.actions

@@ -74,9 +74,8 @@ def test_one_hot_inputs_are_kept_as_a_whole_and_the_shortest_path_is_learned():
         agent = SDNNQLambda(env, seed=1)
         agent.train(env, steps=6000, seed=1)
         assert len(agent.inputs) == env.observation_space.shape[0]
-        assert evaluate(agent, env, episodes=1, seed=1).mean_return == -(5 + 5), (
-            "steps to cell 5, 5"
-        )
+        # It takes 5 + 5 steps to cell (5, 5), at a cost of 1 each.
+        assert evaluate(agent, env, episodes=1, seed=1).mean_return == -(5 + 5)
 
 
 def max_pairs(env, **options):

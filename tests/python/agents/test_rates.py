@@ -69,7 +69,8 @@ class MultiplyRates(Callback):
 
 def schedule():
     return Schedule(
-        learning_rate=lambda progress: 0.6 + 0.4 * np.sin(9 * progress), epsilon=lambda p: 1 - p
+        learning_rate=lambda progress: 0.6 + 0.4 * np.sin(9 * progress),
+        epsilon=lambda progress: 1 - progress,
     )
 
 
@@ -81,11 +82,12 @@ def test_a_training_with_rates_set_by_callbacks_resumes_exactly(new_callback, en
         agent = SDNNQLearning(env, approximator=SMALL, warm_up_steps=50)
         return Training(agent, env, steps=200, callbacks=[new_callback(), *callbacks])
 
-    cuts = (1, 30, 49, 50, 51, 120, 199)
-    whole = check_exact_resume(
-        new_training, lambda: gym.make(env_id), tmp_path / "file", cuts, callbacks=[new_callback()]
+    stop_steps = (1, 30, 49, 50, 51, 120, 199)  # the warm-up ends after step 50
+    options = {"callbacks": [new_callback()]}
+    finished = check_exact_resume(
+        new_training, lambda: gym.make(env_id), tmp_path / "file", stop_steps, **options
     )
-    assert {"agent.learning_rate", "agent.epsilon"} <= whole.agent.state().keys()
+    assert {"agent.learning_rate", "agent.epsilon"} <= finished.agent.state().keys()
 
 
 def test_a_schedule_sets_the_rates_by_the_progress_before_every_step():

@@ -275,7 +275,7 @@ def write_changed(path, new_path, change):
 
 @pytest.mark.parametrize(
     ("change", "field"),
-    [
+    [  # d is the description of the agent, a has the arrays of its state
         (lambda d, a: d.update({"class": "Sarsa"}), "Sarsa"),
         (lambda d, a: d["learning"].update(speed=7.0), "speed"),
         (lambda d, a: d["approximator"].update(n_hidden_units=2**20), "agent.action_value.weights"),

@@ -69,9 +69,8 @@ def test_transitions_of_a_log_do_not_count_as_steps_of_a_search(has_warm_up):
 def test_ends_of_episodes_are_counted_only_after_the_search():
     agent = new_agent()
     act_and_learn(agent, [0.0] * 10)
-    agent.learn(
-        Transition(OBSERVATION, 0, 1.0, OBSERVATION, True)
-    )  # the first reward, which ends the search
+    # The first reward ends the search, and this episode is not counted.
+    agent.learn(Transition(OBSERVATION, 0, 1.0, OBSERVATION, True))
     assert "agent.n_ended" not in agent.state()
     act_and_learn(agent, [1.0] * 20)
     agent.learn(Transition(OBSERVATION, 0, 1.0, OBSERVATION, True))
@@ -91,7 +90,7 @@ def test_a_search_resumes_exactly(n_steps, tmp_path):
 
 
 def test_the_numpy_transcription_searches_with_the_same_actions_and_weights():
-    # The code of the agent.
+    # Sizes that the agent's preset has with two inputs.
     settings = transcription.Settings(seed=1, n_anchor_patterns=9, n_interpolated=44)
     slow = transcription.new_agent(2, [4], settings)
     agent = new_agent()
