@@ -136,7 +136,7 @@ class TrainingLoop(abc.ABC):
         """
         episodes, monotonic = self._episodes, time.monotonic
         while True:
-            while not episodes.unlearned:  # again where a step of a vector was but resets
+            while not episodes.unlearned:  # a step of a vector may consist of resets only
                 self._act_and_step()
             environment = self._learn()
             is_due = self.n_steps >= self._next_call or self._stops or monotonic() >= due
@@ -172,9 +172,9 @@ class TrainingLoop(abc.ABC):
                 episodes.terminal(),
                 adapter.truncated,
                 environments,
-                self._next_call - n_steps,
+                self._next_call - n_steps,  # the most steps to learn
                 n_steps,
-                self.steps,
+                self.steps,  # the goal of the progress; None if that is in episodes
                 episodes.masks,
                 adapter.dts,
             )
@@ -224,9 +224,9 @@ class TrainingLoop(abc.ABC):
         self.n_episodes += 1
         self._episodes.present[environment] = None
         if self._episodes.terminal()[environment]:
-            self._warning_step = 0
+            self._warning_step = 0  # the warning is for trainings in which nothing terminates
         if self.evaluate_every_episodes is not None and self._lacks_evaluation:
-            self._learner.begin_episode(environment)  # learns the pending n-step returns first
+            self._learner.begin_episode(environment)  # so that pending n-step returns are learned
         return row
 
     def _set_progress(self, is_episode_over: bool) -> None:
