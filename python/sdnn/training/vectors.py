@@ -188,7 +188,8 @@ class _Vector(EnvironmentAdapter, abc.ABC):
 
         def has_key(name: str, i: int) -> bool:
             """Return whether the info of environment `i` has a key."""
-            return name in infos and bool(infos.get(f"_{name}", needed)[i])
+            flags = infos.get(f"_{name}")
+            return name in infos and (flags is None or bool(flags[i]))
 
         for i in np.flatnonzero(needed).tolist():
             if not has_key(key, i):

@@ -10,6 +10,7 @@ from sdnn.agents import (
     SDNNActorCritic,
     SDNNQLambda,
     SDNNQLearning,
+    Training,
     Transition,
     UnusableStepError,
     evaluate,
@@ -17,7 +18,7 @@ from sdnn.agents import (
     learn_from,
 )
 from sdnn.approximators import LinearSDNNConfig, SDNNCConfig
-from stopped_training import states_equal
+from stopped_training import check_exact_resume, states_equal
 
 SMALL = SDNNCConfig(n_hidden_units=60, n_active_units=20, n_pattern_units=20)
 SPACES = {"discrete": gym.spaces.Discrete(3), "several": gym.spaces.MultiDiscrete([3, 2])}
@@ -120,6 +121,19 @@ def test_dead_ends_of_vectors_that_reset_themselves_are_learned_as_terminated(mo
         return agent
 
     assert states_equal(trained("truncates"), trained("terminates"))
+
+
+@pytest.mark.parametrize("n_environments", [1, 2])
+def test_a_training_with_dead_ends_resumes_exactly(n_environments, tmp_path):
+    def new_env():
+        makers = [lambda: DeadEnds("truncates")] * n_environments
+        return gym.vector.SyncVectorEnv(makers) if n_environments > 1 else makers[0]()
+
+    def new_training(*callbacks):
+        return Training(new_agent(SDNNQLambda), new_env(), steps=30, callbacks=callbacks)
+
+    # Episodes have 3 steps, so that all places in an episode and a round of two are stopped at.
+    check_exact_resume(new_training, new_env, tmp_path / "training", range(4, 11))
 
 
 def test_an_agent_that_overrides_learn_receives_a_terminated_transition_without_a_mask():
