@@ -5,14 +5,13 @@ from __future__ import annotations
 import abc
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from numbers import Real
 from typing import Any, Self
 
 import numpy as np
 from joblib import effective_n_jobs
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import clone
 from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import Interval
 
@@ -29,13 +28,14 @@ from sdnn.estimators.network import (
     require_memory,
     units_for_pairs,
 )
+from sdnn.estimators.network_settings import require_settings_of_network, settings_of
 from sdnn.estimators.outliers import warn_caller
-from sdnn.estimators.pair_selection import select_pairs, select_pairs_with_part, with_categories
+from sdnn.estimators.pair_selection import selected_pairs
 from sdnn.estimators.parameters import SHARE, RandomState, parameter, wholes, words
 from sdnn.estimators.training import (
     LARGE_SAMPLE,
+    CodedSamples,
     History,
-    Rows,
     Trainer,
     epochs_between_averages,
     held_out,
@@ -104,7 +104,8 @@ class BaseSDNN(Fitted, CodedInputs):
     memory_limit : int, default=2**30
         Bytes for weights and patterns of all networks kept, and again for training.
     warm_start : bool, default=False
-        Whether `fit` resumes with the existing network, ranges and categories.
+        Whether `fit` resumes with the existing network, ranges and categories. Settings that these
+        depend on must stay, as in `partial_fit` and `learn_one`.
     random_state : int, RandomState or None, default=None
         Determines patterns, initial weights, orders and the validation share.
     n_jobs : int, optional
@@ -195,54 +196,46 @@ class BaseSDNN(Fitted, CodedInputs):
 
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
         """Train the network: with a hold-out to stop early, then again on all samples to refit."""
-        if self.warm_start and self.refit:
-            raise ValueError("refit=True trains a new network: it cannot be with warm_start=True")
-        if self.warm_start and self.calibrate:
-            raise ValueError(
-                "calibrate=True trains a second network: it cannot be with warm_start=True"
-            )
+        for name in ("refit", "calibrate"):
+            if self.warm_start and getattr(self, name):
+                raise ValueError(
+                    f"{name}=True trains a second network: it cannot be with warm_start=True"
+                )
         resumes = self.warm_start and hasattr(self, "network_")
+        if resumes:
+            require_settings_of_network(self)
         codings = self.codings_ if resumes else None
         table, observed = self._check_samples(X, y, codings, in_fit=True)
         weights = sample_weights(sample_weight, len(table))
         if resumes:
             random = self._resume(table, observed)
         else:
-            pairs = self._select_pairs(X, table, observed, weights)
-            n_networks, is_large = self._n_networks(len(table)), self._is_large(table)
+            takes_budget = isinstance(self.pairs, str) and self.pairs == "budget"
+            is_large = takes_budget and len(table) > LARGE_SAMPLE
+            pairs = selected_pairs(self, X, table, observed, weights, is_large)
+            n_networks = self._n_networks(len(table))
             random = self._begin(X, table, observed, pairs, n_networks, is_large)
         targets = self._targets(observed, at_once=True)
-        bins = self.network_.input_code.bins(table)
+        samples = CodedSamples(self.network_.input_code.bins(table), targets, weights)
+        # Networks that learn a part of very many samples correct half the share as well.
+        part_of_share = 0.5 if len(table) > self._largest_full_sample else 1.0
         share = self.validation_fraction if self.early_stopping else 0.0
         held_rows, learned_rows = held_out(share, random, len(table))
+        held = samples.of(held_rows)
 
         def score() -> float:
             """Return the score of the present network on the samples that are held out."""
-            held_weights = None if weights is None else weights[held_rows]
-            return self._validation_score(bins[held_rows], targets[held_rows], held_weights)
-
-        def train(rows: Rows, max_iter: int, n_averaged: int) -> tuple[Trainer, History]:
-            """Train on some samples for at most `max_iter` epochs; return trainer and history."""
-            weights_of_rows = None if weights is None else weights[rows]
-            scored = score if self.early_stopping and rows is learned_rows else None
-            times = self._presentations(targets[rows], weights_of_rows)
-            n_samples = len(rows)
-            in_blocks = self.shuffle and times is None and n_samples > LARGE_SAMPLE
-            if in_blocks:
-                rows = random.permutation(rows)
-            # The trainer's block form reuses sums of blocks; it is chosen for few epochs only.
-            n_epochs = min(max_iter, 2) if in_blocks else max_iter
-            learned = self._targets_to_learn(bins[rows], targets[rows], weights_of_rows)
-            # Networks that learn a part of very many samples correct half the share.
-            part_of_share = 0.5 if len(table) > self._largest_full_sample else 1.0
-            trainer = self._trainer(bins[rows], learned, n_epochs, part_of_share)
-            return trainer, run_epochs(
-                self, trainer, n_samples, max_iter, random, scored, times, n_averaged, in_blocks
-            )
+            return self._validation_score(*held)
 
         is_refitted = self.refit and self.early_stopping
-        n_averaged = 1 if is_refitted else self.n_averaged_epochs
-        trainer, history = train(learned_rows, most_epochs(self.max_iter, len(table)), n_averaged)
+        trainer, history = self._train(
+            samples.of(learned_rows),
+            most_epochs(self.max_iter, len(table)),
+            1 if is_refitted else self.n_averaged_epochs,
+            part_of_share,
+            random,
+            score if self.early_stopping else None,
+        )
         self.n_iter_ = len(history.n_corrected)
         self.n_corrected_ = np.array(history.n_corrected, dtype=np.int64)
         self.validation_scores_ = np.array(history.scores)
@@ -250,9 +243,34 @@ class BaseSDNN(Fitted, CodedInputs):
         if is_refitted:  # on the whole sample, for the best number of epochs
             first = self.network_
             self.network_ = Network(first.input_code, first.n_units, seed=self._weight_seed)
-            _, history = train(np.arange(len(table)), history.n_epochs, self.n_averaged_epochs)
+            _, history = self._train(
+                samples, history.n_epochs, self.n_averaged_epochs, part_of_share, random
+            )
         self.network_ = history.network
         self._earlier = history.earlier
+
+    def _train(
+        self,
+        samples: CodedSamples,
+        max_iter: int,
+        n_averaged: int,
+        part_of_share: float,
+        random: np.random.RandomState,
+        score: Callable[[], float] | None = None,
+    ) -> tuple[Trainer, History]:
+        """Train the network for at most `max_iter` epochs; see `run_epochs` and `_trainer`."""
+        times = self._presentations(samples.targets, samples.weights)
+        n_samples = len(samples.bins)
+        in_blocks = self.shuffle and times is None and n_samples > LARGE_SAMPLE
+        if in_blocks:
+            samples = samples.of(random.permutation(n_samples))
+        # The trainer's block form reuses sums of blocks; it is chosen for few epochs only.
+        n_epochs = min(max_iter, 2) if in_blocks else max_iter
+        learned = self._targets_to_learn(*samples)
+        trainer = self._trainer(samples.bins, learned, n_epochs, part_of_share)
+        return trainer, run_epochs(
+            self, trainer, n_samples, max_iter, random, score, times, n_averaged, in_blocks
+        )
 
     def _validate_to_begin(self) -> None:
         """Raise ValueError for parameters with which samples cannot be learned one at a time."""
@@ -271,6 +289,8 @@ class BaseSDNN(Fitted, CodedInputs):
         first = not hasattr(self, "network_")
         if first:
             self._validate_to_begin()
+        else:
+            require_settings_of_network(self)
         X, y, sample_weight = without_absent(X, y, sample_weight)
         table, observed = work._check_samples(X, y, None if first else self.codings_)
         if first:
@@ -294,6 +314,7 @@ class BaseSDNN(Fitted, CodedInputs):
         """Learn a sample; y has shape (1,) or (1, n_outputs)."""
         work = self._copy_to_train()
         if hasattr(self, "network_"):
+            require_settings_of_network(self)
             work._check_outputs(y, classes)
             code = work.network_.input_code
             row = work._row(x, code)
@@ -339,6 +360,7 @@ class BaseSDNN(Fitted, CodedInputs):
         self._weight_seed = weight_seed
         self.n_inputs_out_of_range_ = self._n_weighted = 0
         self._earlier = ()
+        self._begun_with = settings_of(self)
         self._note_inputs(table)
         return random
 
@@ -354,29 +376,6 @@ class BaseSDNN(Fitted, CodedInputs):
         self.network_ = network.copy()
         random: np.random.RandomState = check_random_state(self.random_state)
         return random
-
-    def _select_pairs(
-        self, X: ArrayLike, table: Array, y: Array, weights: Floats | None
-    ) -> Pairs | None:
-        """Return the pairs selected with a hold-out; None if all are taken, or a random share."""
-        is_large = self._is_large(table)
-        is_auto = isinstance(self.pairs, str) and self.pairs == "auto"
-        if not (is_auto or is_large) or table.shape[1] < (2 if is_auto else 3):
-            return None
-        seed = int(check_random_state(self.random_state).randint(2**31 - 1))
-        model = clone(self).set_params(
-            random_state=seed, early_stopping=False, calibrate=False, verbose=0
-        )
-        codings = self._codings(X, table)
-        # A part of the samples may lack a category, or have no missing value of a column.
-        complete = [with_categories(coding, table[:, i]) for i, coding in enumerate(codings)]
-        model.set_params(coding=[(coding, [index]) for index, coding in enumerate(complete)])
-        select = select_pairs_with_part if is_large else select_pairs
-        return select(model, X, y, weights, table.shape[1], seed)
-
-    def _is_large(self, table: Array) -> bool:
-        """Return whether some of many samples select the features."""
-        return isinstance(self.pairs, str) and self.pairs == "budget" and len(table) > LARGE_SAMPLE
 
     def _n_networks(self, n_samples: int) -> int:
         """Return the most networks that `fit` keeps, averaged ones included."""

@@ -26,11 +26,13 @@ from sdnn.estimators.training import (
     class_weights,
     sample_weights,
     weighted_mean,
+    without_classes,
 )
 from sdnn.support.arguments import explains_names, require, shown
 
-UNITS_EACH = 60
-MOST_UNITS = 1200
+# Chosen constants, except where a reason is given.
+UNITS_EACH = 60  # units per class by default
+MOST_UNITS = 1200  # units of all classes by default
 FIRING_SHARE = 5 / 6  # share of a class's units for its samples; the rest fires for other classes
 STEEPNESS = 6.0  # factor of scores in the softmax
 MOST_CALIBRATED = 10_000  # samples: with 100,000, calibration lowers the log loss by 0.002 only
@@ -90,6 +92,8 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
     correction_share: float = parameter(0.25, SHARE)
     calibrate: bool | None = parameter(None, "boolean", None)
 
+    _network_settings = (*BaseSDNN._network_settings, "scheme", "n_units_per_class")
+
     def _fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None) -> None:
         """Train, and with `calibrate` fit the steepness of probabilities to held-out samples."""
         may_be = not self.calibrate or self._has_several_units()
@@ -113,9 +117,8 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
     def _calibrated_steepness(self, held: HeldOut, by_class: Floats | None) -> float:
         """Return the steepness with the smallest log loss on samples that are held out.
 
-        ``by_class`` are the weights of all samples by their classes.
-
-        Half a sample more has a random class, because a few samples may all be predicted rightly.
+        ``by_class`` are the weights of all samples by their classes. Half a sample more has a
+        random class: few samples may all be predicted rightly, and then no steepness is too large.
         """
         model = cast(SDNNClassifier, held.model)
         scores = model._scores(model._bins(held.X), self._n_threads())
@@ -261,7 +264,9 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
 
     def _presentations(self, targets: Ints, weights: Floats | None) -> Floats | None:
         """Return the weight of each sample, times that of its class; None if all are equal."""
-        by_class = class_weights(self.class_weight, self.classes_[targets])
+        labels = self.classes_[targets]
+        absent = np.setdiff1d(self.classes_, labels).tolist()  # all of them may be held out
+        by_class = class_weights(without_classes(self.class_weight, absent), labels)
         if by_class is None or weights is None:
             return weights if by_class is None else by_class
         product = by_class * weights

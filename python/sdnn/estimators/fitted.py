@@ -17,6 +17,7 @@ from sdnn.coding import Coding, from_dict, to_dict
 from sdnn.coding.symbols import Categorical, present
 from sdnn.estimators.columns import Array, Codings, Floats, Ints, coding_entries
 from sdnn.estimators.network import InputCode, Network, code_bytes
+from sdnn.estimators.network_settings import changed_settings, plain_setting, settings_of
 from sdnn.support.arguments import seed_of, whole
 from sdnn.support.files import Arrays, Description, read_file, write_file
 
@@ -82,6 +83,10 @@ class Fitted(Learned):
     shuffle: bool
     verbose: int
     network_: Network
+    _network_settings: tuple[str, ...] = ("coding", "ranges", "n_pattern_units", "pairs", "tables")
+    """Settings that decide the network: it cannot follow later changes of them."""
+    _begun_with: dict[str, object]
+    """Values that these settings had when the network began."""
     _earlier: tuple[Network, ...] = ()
     _n_weighted = 0
 
@@ -179,6 +184,10 @@ class Fitted(Learned):
             "modified": [number_of[id(table)] for table in code.modified],
             "modifiers": [number_of[id(table)] for table in code.modifiers],
         }
+        changed = changed_settings(self._begun_with, settings_of(self), plain_setting)
+        if changed:
+            begun_with = {name: json_value(self._begun_with[name]) for name in changed}
+            description["begun_with"] = begun_with
         write_file(Path(path), "estimator", arrays, description)
 
     @classmethod
@@ -216,6 +225,9 @@ class Fitted(Learned):
         estimator = cls(**parameters)
         estimator._validate_params()
         coding_entries(estimator.coding)
+        estimator._begun_with = settings_of(estimator)
+        for name, value in description.get("begun_with", {}).items():
+            estimator._begun_with[name] = restored(value)
         stored = {**description["attributes"], **arrays}
         for name, expected in ATTRIBUTES.items():
             if name in stored:

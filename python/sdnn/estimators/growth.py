@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from sdnn.coding import Coding
 from sdnn.estimators.base import BaseSDNN
 from sdnn.estimators.columns import PAIR_BUDGET, Pairs
 from sdnn.estimators.network import InputCode, Network, require_memory
+from sdnn.estimators.network_settings import settings_of
 
 Table = NDArray[np.int8]
 
@@ -43,8 +44,9 @@ def grow(
     """
     network, before = model.network_, model.network_.input_code
     n_before, n_units = len(before.codings), before.core.n_units
-    n_patterns = sum(coding.size for coding in before.codings)  # part of the seed: grows each time
-    random = np.random.RandomState((model._weight_seed + n_patterns) % 2**32)  # seeds of 32 bits
+    # Each growth adds patterns, so that their number gives every growth another seed, of 32 bits.
+    n_patterns = sum(coding.size for coding in before.codings)
+    random = np.random.RandomState((model._weight_seed + n_patterns) % 2**32)
     added = pairs_of_new(n_before, len(new), random)
     pairs = [*before.pairs, *added]
     if len(pairs) * n_units > most_columns:
@@ -52,6 +54,30 @@ def grow(
     codings = [changed.get(index, coding) for index, coding in enumerate(before.codings)]
     codings += new.values()
     require_memory(model.memory_limit, network.n_units, 1, n_units, codings, pairs)
+    code = grown_code(before, codings, added, random)
+    weights = np.zeros((network.n_units, code.core.n_columns), dtype=np.int32)
+    weights[:, : before.core.n_columns] = network.layer.weights
+    names = [*model.feature_names_in_.tolist(), *new]
+    work = model._copy_to_train()
+    thresholds = network.layer.thresholds
+    work.network_ = Network(code, network.n_units, weights=weights, thresholds=thresholds)
+    work._earlier = ()
+    work.feature_names_in_ = np.array(names, dtype=object)
+    work.n_features_in_ = len(names)
+    work.coding = [(coding, [name]) for coding, name in zip(codings, names, strict=True)]
+    work._begun_with = settings_of(work)
+    model.__dict__ = work.__dict__
+    return True
+
+
+def grown_code(
+    before: InputCode, codings: Sequence[Coding], added: Pairs, random: np.random.RandomState
+) -> InputCode:
+    """Return a code with the columns of an earlier one, and then those of added pairs.
+
+    ``codings`` are those of the earlier inputs, some with more categories, and then of new inputs.
+    """
+    n_before, n_units = len(before.codings), before.core.n_units
     tables: dict[int, Table] = {}  # by `id` of the old table, which several pairs may share
 
     def lengthened(table: Table, index: int) -> Table:
@@ -69,23 +95,12 @@ def grow(
         np.ones((codings[nu].size, n_units), np.int8) if mu == nu else lengthened(table, nu)
         for (mu, nu), table in zip(before.pairs, before.modifiers, strict=True)
     ]
+    # New pairs use the table of an earlier input as modified; only if it has none, as a modifier.
     patterns = {nu: table for (_, nu), table in zip(before.pairs, modifiers, strict=True)}
     patterns |= {mu: table for (mu, _), table in zip(before.pairs, modified, strict=True)}
-    for index, coding in enumerate(new.values(), start=n_before):
-        patterns[index] = coding.patterns(n_units, int(random.randint(2**31 - 1)))
+    for index in range(n_before, len(codings)):
+        patterns[index] = codings[index].patterns(n_units, int(random.randint(2**31 - 1)))
     for mu, nu in added:
         modified.append(patterns[mu])
         modifiers.append(np.ascontiguousarray(patterns[nu][:, random.permutation(n_units)]))
-    code = InputCode(codings, pairs, modified, modifiers)
-    weights = np.zeros((network.n_units, code.core.n_columns), dtype=np.int32)
-    weights[:, : before.core.n_columns] = network.layer.weights
-    names = [*model.feature_names_in_.tolist(), *new]
-    work = model._copy_to_train()
-    thresholds = network.layer.thresholds
-    work.network_ = Network(code, network.n_units, weights=weights, thresholds=thresholds)
-    work._earlier = ()
-    work.feature_names_in_ = np.array(names, dtype=object)
-    work.n_features_in_ = len(names)
-    work.coding = [(coding, [name]) for coding, name in zip(codings, names, strict=True)]
-    model.__dict__ = work.__dict__
-    return True
+    return InputCode(codings, [*before.pairs, *added], modified, modifiers)

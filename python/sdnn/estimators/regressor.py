@@ -17,10 +17,10 @@ from sdnn.estimators.intervals import coverage_of, error_bounds
 from sdnn.estimators.network import Rule
 from sdnn.estimators.outliers import warn_caller
 from sdnn.estimators.parameters import documents, parameter, wholes, words
-from sdnn.estimators.training import weighted_mean
+from sdnn.estimators.training import Rows, weighted_mean
 from sdnn.support.arguments import array_of, explains_names, require, shown
 
-MARGIN = 0.2  # share of the range of targets that is added on either side
+MARGIN = 0.2  # share of the range of targets that is added on either side: a chosen constant
 FURTHEST = 1e300  # largest limit of an output range, so that its width is finite
 
 
@@ -82,6 +82,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
     refit: bool = parameter(False, "boolean")
     calibrate: bool = parameter(False, "boolean")
 
+    _network_settings = (*BaseSDNN._network_settings, "n_output_units", "output_range")
     _largest_full_sample = 50_000
 
     def partial_fit(
@@ -243,6 +244,7 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
         low, high = self._ranges_of(targets)
         if np.any(np.maximum(-low, high) > FURTHEST):
             raise ValueError(f"y must be within {FURTHEST}, got [{low.min()}, {high.max()}]")
+        # A constant target has no width: its margin is its size, at least 1.
         margin = np.where(high > low, MARGIN * (high - low), np.maximum(1.0, np.abs(low)))
         return np.stack([low - margin, high + margin], axis=1)
 
@@ -284,13 +286,21 @@ class SDNNRegressor(CodedRegressor, BaseSDNN):
             self.n_outputs_out_of_range_ += int(np.count_nonzero(outside))
         if self.out_of_range == "clip":
             return counts
-        if at_once:
-            self._widen(targets.min(axis=0))
-            self._widen(targets.max(axis=0))
-            return self._counts_of_targets(targets)
-        # Targets widen the range one after the other: each batch has the counts of its range.
+        if not at_once:
+            return self._counts_while_widening(targets, np.flatnonzero(outside.any(axis=1)))
+        self._widen(targets.min(axis=0))
+        self._widen(targets.max(axis=0))
+        return self._counts_of_targets(targets)
+
+    def _counts_while_widening(self, targets: Floats, rows: Rows) -> Floats:
+        """Widen the range by targets, one after the other, and return the counts of all targets.
+
+        ``rows`` are those with a target outside the range. Each target has the count of the range
+        that it and the targets before it leave, as if it had come alone.
+        """
+        counts = np.empty_like(targets)
         begin = 0
-        for row in np.flatnonzero(outside.any(axis=1)).tolist():
+        for row in rows.tolist():
             counts[begin:row] = self._counts_of_targets(targets[begin:row])
             begin = row
             low, high = self.output_range_.T

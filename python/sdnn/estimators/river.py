@@ -17,6 +17,7 @@ from sdnn.estimators.classifier import SDNNClassifier
 from sdnn.estimators.columns import Floats
 from sdnn.estimators.experts import ClassificationExperts, RegressionExperts
 from sdnn.estimators.intervals import FollowedErrors, coverage_of
+from sdnn.estimators.network_settings import Settings
 from sdnn.estimators.regressor import SDNNRegressor
 from sdnn.estimators.stream_estimator import (
     Features,
@@ -72,6 +73,10 @@ class RiverRegressor(StreamEstimator, base.Regressor):
         super().__init__(model, grace_period, follows_ranges, experts)
         self.coverage = coverage_of(coverage)
         self.errors = FollowedErrors(self.coverage)
+        self._begun_with = {"coverage": self.coverage}  # from the first sample on
+
+    def _settings(self) -> Settings:
+        return {**super()._settings(), "coverage": self.coverage}
 
     def _check_target(self, y: Target) -> None:
         require(is_finite_number(y), "y", "be a finite number", y)

@@ -22,6 +22,13 @@ from sdnn.estimators.followed_ranges import FollowedRanges
 from sdnn.estimators.growth import grow
 from sdnn.estimators.inputs import with_names
 from sdnn.estimators.network import COLUMN_BUDGET
+from sdnn.estimators.network_settings import (
+    Settings,
+    change_error,
+    changed_settings,
+    copied,
+    plain_setting,
+)
 from sdnn.estimators.outliers import numbers_to_range
 from sdnn.estimators.regressor import SDNNRegressor
 from sdnn.support.arguments import flag, require, shown, whole
@@ -130,6 +137,7 @@ class StreamEstimator:
         self.categories: dict[str, set[object]] = {}  # learned categories by feature
         self.most_columns = 0  # limit of a growing code
         self.mixed: Experts | None = None  # once fitted, unless the network is alone
+        self._begun_with: Settings = {}  # values of `_settings` when the stream began to learn
         self._latest: tuple[int, list[tuple[str, type, object]], Estimates] | None = None
 
     @property
@@ -141,6 +149,7 @@ class StreamEstimator:
 
     def learn_one(self, x: Features, y: Target) -> None:
         """Learn one sample; an error changes nothing."""
+        self._require_same_settings()
         sample = cleaned_sample(x)
         self._check_target(y)
         if self.fitted is not None:
@@ -165,6 +174,21 @@ class StreamEstimator:
                 self.fitted = self.mixed = None
                 raise
 
+    def _settings(self) -> Settings:
+        """Return the settings that a stream that has begun cannot follow."""
+        names = (*self.model._network_settings, "correction_share", "out_of_range")
+        of_model = {f"model.{name}": getattr(self.model, name) for name in names}
+        return {"experts": self.experts, "follows_ranges": self.follows_ranges, **of_model}
+
+    def _require_same_settings(self) -> None:
+        """Raise ValueError if a setting was changed since the stream began."""
+        if not self._begun_with:
+            return
+        settings = self._settings()
+        for name in changed_settings(self._begun_with, settings, plain_setting):
+            remedy = "learn anew with a clone() of the estimator"
+            raise change_error(name, self._begun_with[name], settings[name], "stream", remedy)
+
     @abc.abstractmethod
     def _check_target(self, y: object) -> None:
         """Raise ValueError for an impossible target."""
@@ -180,7 +204,8 @@ class StreamEstimator:
     def _estimates(self, sample: Sample) -> Estimates:
         """Return the predictions of all experts for a sample that is not learned yet.
 
-        They are kept, since the predicted sample is most often the next one to be learned.
+        They are kept, since the predicted sample is most often the next one to be learned. The key
+        includes types: True equals 1, but is another value where words are read.
         """
         key = [(name, type(value), value) for name, value in sample.items()]
         latest = self._latest
@@ -196,20 +221,25 @@ class StreamEstimator:
         return estimates
 
     def _mix(self, estimates: Estimates) -> Floats:
+        """Return the mean of all predictions by their weights, or the network's, (n_outputs,)."""
         return estimates.each[0] if self.mixed is None else self.mixed.mix(estimates.each)
 
     def _learn(self, sample: Sample, y: Target) -> None:
         self.fitted.learn_one(sample, y)
 
     def _sample(self, sample: Mapping[str, object], learns: bool = False) -> dict[str, object]:
-        """Return the values of known features, None where missing; ranges may learn from them."""
+        """Return the network's values of known features, None where missing.
+
+        With `learns` the ranges that are followed also learn from the sample.
+        """
         return self._moved(self._read(sample), learns)
 
     def _moved(self, read: Sample, learns: bool = False) -> Sample:
+        """Return values as the network has them: with followed ranges, moved to learned ones."""
         return read if self.ranges is None else self.ranges.moved(read, learns)
 
     def _read(self, sample: Mapping[str, object]) -> dict[str, object]:
-        """Convert the values of known features; features that `sample` lacks are None."""
+        """Return the values of known features, converted by `reads`; None where missing."""
         get = sample.get
         return {
             name: None if (value := get(name)) is None else as_read(value)
@@ -272,6 +302,7 @@ class StreamEstimator:
         self._begin_experts(names)
         n_columns = self.fitted.network_.input_code.core.n_columns
         self.most_columns = 2 * max(COLUMN_BUDGET, n_columns)  # beyond it `_grow` begins anew
+        self._begun_with = {name: copied(value) for name, value in self._settings().items()}
 
     def _begin_experts(self, names: Sequence[str]) -> None:
         """Let the experts beside the network learn the last samples; their weights stay."""

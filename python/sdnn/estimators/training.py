@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,6 +36,19 @@ MOST_EPOCHS, FEWEST_EPOCHS = 30, 5  # bounds of the default number of epochs
 MOST_PRESENTATIONS = 80_000  # samples presented in all epochs by default
 GOLDEN_RATIO = 0.6180339887498949
 """Multiples of it, without their whole parts, spread evenly over [0, 1)."""
+
+
+class CodedSamples(NamedTuple):
+    """Samples as a network learns them."""
+
+    bins: Ints  # shape (n_samples, n_inputs)
+    targets: Array  # firing counts, shape (n_samples, n_outputs), or the numbers of classes
+    weights: Floats | None
+
+    def of(self, rows: Rows) -> CodedSamples:
+        """Return some of the samples, by their numbers."""
+        weights = None if self.weights is None else self.weights[rows]
+        return CodedSamples(self.bins[rows], self.targets[rows], weights)
 
 
 @dataclasses.dataclass
@@ -139,6 +152,17 @@ def class_weights(class_weight: ClassWeight, labels: Array) -> Floats | None:
     return sample_weights(each, len(labels), name="class_weight")
 
 
+def without_classes(class_weight: ClassWeight, absent: Sequence[object]) -> ClassWeight:
+    """Return class weights without those of absent classes, which scikit-learn may refuse.
+
+    >>> without_classes({"rare": 9.0, "frequent": 1.0}, absent=["rare"])
+    {'frequent': 1.0}
+    """
+    if not isinstance(class_weight, Mapping):
+        return class_weight
+    return {label: weight for label, weight in class_weight.items() if label not in absent}
+
+
 def weighted_mean(values: Array, weights: Floats | None) -> float:
     """Return the weighted mean, or the plain mean without weights or if all of them are 0."""
     if weights is None or not weights.any():
@@ -158,6 +182,8 @@ def samples_of_epoch(n_samples: int, weights: Floats | None, epoch: int, n_befor
     in_order = np.arange(n_samples, dtype=np.int32)
     if weights is None:
         return in_order
+    # A sample was due weight * epoch times before the epoch: it is presented once for each whole
+    # number in between. Phases let samples of equal weight take turns.
     phases = (n_before + in_order) * GOLDEN_RATIO % 1
     times = np.floor(weights * (epoch + 1) + phases) - np.floor(weights * epoch + phases)
     return np.repeat(in_order, times.astype(np.int64))
@@ -260,7 +286,8 @@ def run_epochs(
             if score is not None:
                 trainer.synchronize()
                 history.scores.append(score())
-                if epoch == 0 or history.scores[-1] > history.scores[history.n_epochs - 1]:
+                is_best = epoch == 0 or history.scores[-1] > history.scores[history.n_epochs - 1]
+                if is_best:
                     history.network, history.earlier = network.copy(), tuple(earlier)
                     history.n_epochs = epoch + 1
                 elif epoch + 1 - history.n_epochs >= model.n_iter_no_change:

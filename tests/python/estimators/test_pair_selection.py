@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from sdnn import SDNNClassifier, SDNNRegressor
-from sdnn.coding import CorrelationMatrix, Symbolic, WithMissing
+from sdnn.coding import CorrelationMatrix, RandomInverse, Symbolic, WithMissing
 
 X = np.random.RandomState(0).uniform(size=(600, 8))
 XOR = ((X[:, 2] > 0.5) ^ (X[:, 5] > 0.5)).astype(int)
@@ -104,3 +104,57 @@ def test_features_are_selected_where_only_the_held_out_part_lacks_a_value(seed):
     incomplete[seed * 7, 2] = np.nan
     model = SDNNClassifier(**{**OPTIONS, "random_state": seed}, pairs="auto")
     assert model.fit(incomplete, XOR[:60]).predict(incomplete).shape == (60,)
+
+
+@pytest.mark.parametrize("coding", ["random-inverse", RandomInverse(spacing="quantile"), "words"])
+@pytest.mark.parametrize("n_present", [1, 2])
+@pytest.mark.parametrize("seed", range(5))  # each has another fifth held out
+def test_pairs_can_be_selected_with_a_column_of_hardly_any_values(coding, n_present, seed):
+    frame = pd.DataFrame(X[:60, :4], columns=["a", "b", "c", "rare"])
+    frame.loc[n_present:, "rare"] = np.nan
+    if coding == "words":
+        frame["rare"] = [None if np.isnan(value) else "word" for value in frame["rare"]]
+        coding = [(WithMissing(base=Symbolic()), ["rare"])]
+    options = {"n_pattern_units": 16, "max_iter": 2, "random_state": seed}
+    model = SDNNRegressor(coding, pairs="auto", **options).fit(frame, X[:60, 0])
+    expected_model = SDNNRegressor(coding, pairs=model.pairs_, **options).fit(frame, X[:60, 0])
+    assert model.codings_ == expected_model.codings_, "fitted to the whole column"
+    np.testing.assert_array_equal(model.weights_, expected_model.weights_)
+
+
+def test_features_of_many_samples_can_be_selected_with_a_column_of_a_single_value():
+    samples = np.random.RandomState(0).uniform(size=(5001, 3))
+    targets = samples[:, 0].copy()
+    samples[1:, 2] = np.nan
+    options = {"n_pattern_units": 16, "max_iter": 1, "n_output_units": 10, "random_state": 0}
+    assert SDNNRegressor(**options).fit(samples, targets).n_features_in_ == 3
+
+
+def test_features_of_many_samples_can_be_selected_with_many_flipped_units():
+    samples = np.random.RandomState(0).uniform(size=(5001, 3))
+    options = {"n_pattern_units": 100, "max_iter": 1, "n_output_units": 10, "random_state": 0}
+    # The small networks that select have 64 units per pattern, too few to flip 50 of each sign.
+    model = SDNNRegressor(RandomInverse(n_flipped=50), **options).fit(samples, samples[:, 0])
+    assert model.codings_[0].n_flipped == 50
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_part_with_outliers_that_the_whole_has_not_can_select_pairs(seed):
+    # A gap above 2 widths parts outliers from [0, 1]: below 3, if the 1.9 is held out.
+    samples = X[:60, :3].copy()
+    samples[:2, 2] = 1.9, 3.0
+    model = SDNNRegressor(ranges="robust", out_of_range="error", pairs="auto", max_iter=1)
+    assert model.set_params(random_state=seed).fit(samples, X[:60, 0]).n_inputs_out_of_range_ == 0
+
+
+@pytest.mark.parametrize("options", [{"pairs": "auto"}, {"early_stopping": True}])
+def test_the_weight_of_a_class_does_not_matter_where_the_class_is_held_out(options):
+    labels = XOR[:40].copy()
+    labels[0] = 2
+    for seed in range(12):  # a fifth or a tenth is held out: now and then the only sample of 2
+        model = SDNNClassifier(n_pattern_units=16, max_iter=1, class_weight={2: 3.0}, **options)
+        assert model.set_params(random_state=seed).fit(X[:40, :3], labels).classes_.tolist() == [
+            0,
+            1,
+            2,
+        ]
