@@ -151,8 +151,8 @@ def docs_weekly(session):
 
 SHORT_TESTS = (
     "core/test_config.py", "core/test_lazy.py", "estimators/test_files.py",
-    "estimators/test_online.py", "estimators/test_scikit_learn.py", "agents/test_saving.py",
-    "agents/test_habits.py", "runs/test_run.py", "runs/test_spec.py",
+    "estimators/test_online.py", "estimators/test_river.py", "estimators/test_scikit_learn.py",
+    "agents/test_saving.py", "agents/test_habits.py", "runs/test_run.py", "runs/test_spec.py",
 )  # fmt: skip
 
 

@@ -18,11 +18,6 @@ pytestmark = pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarni
 OPTIONS = {"n_pattern_units": 40, "random_state": 0}
 
 
-@pytest.fixture(scope="module")
-def river():
-    return pytest.importorskip("sdnn.estimators.river")
-
-
 def regressor(river, experts="linear", **options):
     model = SDNNRegressor(out_of_range="widen", **OPTIONS)
     return river.RiverRegressor(model, experts=experts, **options)

@@ -18,15 +18,6 @@ UNIT = RandomInverse(low=0.0, high=1.0)
 DAY = datetime.date(2026, 11, 29)
 
 
-@pytest.fixture(scope="module")
-def river():
-    """Return the module of river's estimators."""
-    pytest.importorskip("river")
-    from sdnn.estimators import river
-
-    return river
-
-
 def mean_error(model, samples, targets):
     """Return the mean error of the last 200 predictions, each made before its sample is learned."""
     errors = []

@@ -145,8 +145,7 @@ def test_half_widths_are_quantiles_of_the_last_errors_whose_level_follows_the_co
 
 
 @pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
-def test_river_intervals_contain_their_share_of_targets_as_the_noise_changes():
-    river = pytest.importorskip("sdnn.estimators.river")
+def test_river_intervals_contain_their_share_of_targets_as_the_noise_changes(river):
     random = np.random.RandomState(0)
     model = river.RiverRegressor(SDNNRegressor(n_pattern_units=40, random_state=0), coverage=0.8)
     is_covered = []
@@ -166,8 +165,7 @@ def test_river_intervals_contain_their_share_of_targets_as_the_noise_changes():
     )
 
 
-def test_river_intervals_of_extreme_targets_are_finite():
-    river = pytest.importorskip("sdnn.estimators.river")
+def test_river_intervals_of_extreme_targets_are_finite(river):
     model = river.RiverRegressor(grace_period=5)
     assert model.predict_one({"a": 1.0}, with_interval=True).width == 0.0
     for number in range(4):
