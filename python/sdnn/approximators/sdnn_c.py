@@ -75,7 +75,7 @@ class SDNNC:
 
     @property
     def _lattice_step(self) -> np.float64:
-        """The core's unit of weights and thresholds, which are integers there, in the paper's."""
+        """The size, in the paper's units, of 1 in the core's integer weights and thresholds."""
         return np.float64(self.config.learning_coefficient / self.config.lattice)
 
     @property

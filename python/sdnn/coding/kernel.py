@@ -33,8 +33,9 @@ __all__ = ["AnalyticKernel", "correlations", "plot_similarity", "similarity"]
 
 N_UNITS = 2000  # default number of units per pattern
 MOST_INPUTS = 4096
-_CELLS = "fiubUSO"  # types of tables
-OF_VALUES = ("low", "high", "knots", "period", "origin", "categories")  # fields of codings
+_CELLS = "fiubUSO"  # letters of NumPy's types that tables may have: numbers, words and objects
+OF_VALUES = ("low", "high", "knots", "period", "origin", "categories")
+"""Fields of codings that map values to bins, and do not change the patterns of bins."""
 ENTRIES_AT_ONCE = 2**18  # entries of a kernel matrix computed at a time
 
 

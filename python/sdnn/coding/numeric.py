@@ -15,10 +15,11 @@ from sdnn import _core
 from sdnn.coding.base import Coding, Column, fitted_field
 from sdnn.support.arguments import array_of, one_of, real, require, shown, whole
 
+# Chosen constants.
 MAX_BINS = 65535
-FINE = 1000  # bins; more make no visible difference
+FINE = 1000  # most bins by default; longer patterns flip more units per bin instead
 LONGEST = 1000.0  # the largest length_scale
-FEW_BINS = 8
+FEW_BINS = 8  # fewer cause a `CoarseCodeWarning`
 MAX_KNOTS = 129  # more knots of a column's distribution hardly change the codes
 
 Knots = tuple[tuple[float, float], ...]
@@ -110,7 +111,10 @@ class Ranged(Coding):
         return np.minimum((positions * self.size).astype(np.int32), np.int32(self.size - 1))
 
     def _learned_range(self, column: NDArray[np.float64]) -> tuple[float, float]:
-        """Return the given limits, or the column's where they are None."""
+        """Return the given limits, or the column's where they are None.
+
+        A range of a single value is possible only for a column that has no other value.
+        """
         low = float(np.min(column)) if self.low is None else real("low", self.low)
         high = float(np.max(column)) if self.high is None else real("high", self.high)
         is_constant = low == high and bool(np.all(column == low))

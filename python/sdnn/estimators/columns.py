@@ -93,7 +93,7 @@ def with_fields(coding: Codings, fields: Mapping[str, object]) -> Codings:
     24.0
     """
     if not isinstance(coding, list | tuple):
-        return with_own_fields(coding_named(coding), fields)
+        return with_replaced_fields(coding_named(coding), fields)
     reached: set[str] = set()
     entries: list[Entry] = []
     for number, (entry, columns) in enumerate(coding_entries(coding)):
@@ -102,7 +102,7 @@ def with_fields(coding: Codings, fields: Mapping[str, object]) -> Codings:
         numbered = {name: name.removeprefix(prefix) for name in fields if name.startswith(prefix)}
         reached |= {*shared, *numbered}
         changes = shared | {short: fields[name] for name, short in numbered.items()}
-        entries.append((with_own_fields(entry, changes), columns))
+        entries.append((with_replaced_fields(entry, changes), columns))
     if unknown := set(fields) - reached:
         raise ValueError(
             f"coding__{min(unknown)} must be a field of a coding in the list, or of the first with "
@@ -123,7 +123,7 @@ def field_names(coding: Coding) -> list[str]:
     return [field.name for field in dataclasses.fields(coding)]
 
 
-def with_own_fields(coding: Coding, fields: Mapping[str, object]) -> Coding:
+def with_replaced_fields(coding: Coding, fields: Mapping[str, object]) -> Coding:
     """Return a coding with some fields replaced; ``base__period`` is a field of its field."""
     if not all(has_field(coding, name) for name in fields):
         raise ValueError(f"{coding!r} must have the fields {sorted(fields)}")

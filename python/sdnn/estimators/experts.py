@@ -22,6 +22,7 @@ from sdnn.estimators.outliers import usual_range
 EXPERTS = ("network", "linear", "window")
 """Values of the setting ``experts``: each has the experts of the value before it, and others."""
 
+# Chosen constants, except where a reason is given.
 FORGETTING_OF_MEAN = 0.999  # factor of a sample's weight with each later sample
 FORGETTING = (0.999, 0.98)  # this factor in two linear regressions, which are reported as one
 PRIORS = (4.0, 2.0, 1.0)  # first weights of mean and regressions: simple experts are likely
@@ -46,11 +47,11 @@ class Estimates(NamedTuple):
 
 
 class LinearColumns:
-    """Turns samples into rows of numbers, NaN where a number is missing.
+    """Turns samples into rows of numbers for linear regression.
 
-    A number is a column; a feature with categories has a column of 0 or 1 for each of them, and 0
-    in all for another category or a missing value. Features beyond `MOST_COLUMNS` columns are left
-    out.
+    A numeric feature is a column, NaN where it is missing. A feature with categories has a column
+    of 0 or 1 for each of them, and 0 in all for another category or a missing value. There are at
+    most `MOST_COLUMNS` columns, of the first features and categories.
     """
 
     def __init__(self) -> None:
@@ -61,10 +62,10 @@ class LinearColumns:
     def add(
         self, codings: Mapping[str, Coding], rows: Sequence[Mapping[str, object]]
     ) -> tuple[list[float], list[float]]:
-        """Add the columns of features and of new categories; return their lowest, highest values.
+        """Add columns for features and categories that have none; return their limits.
 
-        A number has a column, a category an indicator, 0 or 1; beyond `MOST_COLUMNS` none is
-        added. ``codings`` are fitted; ``rows`` have the last values of all features.
+        These are the lowest and the highest usual value of each new column. ``codings`` are fitted;
+        ``rows`` have the last values of all features.
         """
         low: list[float] = []
         high: list[float] = []
@@ -148,11 +149,12 @@ class Experts(abc.ABC):
         )
 
     def _models(self) -> list[Any]:
+        """Return the experts but the network: the mean, which has no inputs, is the first."""
         return [self.mean, *self.linear, *([] if self.window is None else [self.window])]
 
     def _learn(self, row: Floats, target: Floats) -> None:
-        """Learn a scaled sample in every expert but the network."""
-        if self.window is not None:
+        """Learn a sample in every expert but the network."""
+        if self.window is not None:  # before the regression learns the same sample
             self.window.learn(row, finite_sum(target, -self.linear[0].predict(row)))
         self.mean.learn([], target)
         for model in self.linear:

@@ -9,7 +9,7 @@ import pandas as pd
 
 from sdnn.estimators.columns import Floats
 
-WINDOW = 500  # number of last samples whose range inputs are scaled from
+WINDOW = 500  # number of last samples whose range inputs are scaled from: a chosen constant
 FARTHEST = 1e300  # largest distance of a value from the range, in widths
 
 
@@ -27,7 +27,7 @@ class FollowedRanges:
         self.recent = np.full((WINDOW, len(self.names)), np.nan)
         last = np.clip(values[-WINDOW:], self.low, self.high)
         self.recent[: len(last)] = last
-        self.n_noted = len(last)
+        self.n_noted = len(last)  # the next sample replaces row `n_noted` modulo `WINDOW`
         self.now = self.low, self.high  # of the last samples, which is mapped to the learned range
 
     def extend(self, ranges: Mapping[str, tuple[float, float]], last: pd.DataFrame) -> None:
@@ -43,6 +43,7 @@ class FollowedRanges:
         self.recent[self.n_noted % WINDOW] = values
         self.n_noted += 1
         low, high = self.now
+        # Values may widen the range at once; old values leave it once per window, to save time.
         if self.n_noted % WINDOW == 0 or np.any((values < low) | (values > high)):
             low = np.fmin.reduce(self.recent)
             high = np.fmax.reduce(self.recent)

@@ -22,6 +22,7 @@ from sdnn.estimators.columns import Array, Floats, Ints
 from sdnn.estimators.ridge import Samples, Solution, apply_degree, diagonal, solve
 from sdnn.estimators.training import Rows
 
+# Chosen constants, except where a reason is given.
 MOST_SAMPLES = 400  # samples that decide; solving for more would take longer than the fit itself
 MOST_OUTPUTS = 200  # samples whose outputs are compared, for importances and gradients
 LARGEST_ERROR = 0.97  # largest error of a better choice, as a share of the error before
@@ -164,10 +165,10 @@ class InputChoice:
         self._bins = [coding.bins(self._table[:, i]) for i, coding in enumerate(codings)]
         self._matrices: dict[object, Floats] = {}
         self._positions = positions(self._table, codings)
-        self._few = slice(MOST_OUTPUTS)
+        self._few = slice(MOST_OUTPUTS)  # the samples whose outputs are compared
         weights = self._samples.weights
         self._shares = weights / weights.sum()
-        self._n_samples = (1 / self._samples.shares).sum()
+        self._n_samples = (1 / self._samples.shares).sum()  # before equal samples became one
         means = self._shares @ self._positions
         self._deviations = np.sqrt(self._shares @ np.square(self._positions - means))
         self._variances = self._samples.variances
@@ -228,7 +229,11 @@ class InputChoice:
         return Candidate(inputs, solution, losses, total, kernel)
 
     def _penalty(self, inputs: Inputs) -> float:
-        """Return the factor by which directions make the leave-one-out error too small."""
+        """Return the factor by which directions make the leave-one-out error too small.
+
+        It is (n + p) / (n - p) for n samples and p fitted parameters (Akaike's final prediction
+        error): the weights of each direction, of which the scale is free.
+        """
         n_parameters = np.maximum(np.count_nonzero(inputs.directions, axis=1) - 1, 0).sum()
         if n_parameters >= self._n_samples:
             return math.inf
@@ -238,7 +243,10 @@ class InputChoice:
         return float(self._shares @ candidate.losses)
 
     def _is_better(self, candidate: Candidate, other: Candidate) -> bool:
-        """Return whether a candidate's error is clearly smaller, by size and by significance."""
+        """Return whether a candidate's error is clearly smaller, by size and by significance.
+
+        The second is a paired test: the mean gain of a sample in units of its standard error.
+        """
         if self._error(candidate) > LARGEST_ERROR * self._error(other):
             return False
         gains = other.losses - candidate.losses
@@ -257,7 +265,12 @@ class InputChoice:
         return halvings
 
     def _slopes(self, candidate: Candidate, correlations: Floats) -> Floats:
-        """Return derivatives of the kernel of a few samples by the correlations of an input."""
+        """Return derivatives of the kernel of a few samples by the correlations of an input.
+
+        Shapes are (n_few, n_samples). With n inputs, the sum S of their correlations and Q of their
+        squares, the kernel is ((n - 1) S + S^2 - Q) / (2 n (n - 1)), as in `kernel_of_sums`. Its
+        derivative by one correlation r is (n - 1 + 2 S - 2 r) / (2 n (n - 1)).
+        """
         n = len(candidate.inputs.features) + len(candidate.inputs.directions)
         slopes: Floats = np.ones_like(correlations)
         if n > 1:
@@ -317,11 +330,11 @@ class InputChoice:
         Shape (n_samples, n_outputs). They are differences over a step, within the feature's range.
         """
         coding, bins = self._codings[feature], self._bins[feature][self._few]
-        step = max(1, round(STEP * self._deviations[feature] * coding.size))
+        step = max(1, round(STEP * self._deviations[feature] * coding.size))  # in bins
         above, below = np.minimum(bins + step, coding.size - 1), np.maximum(bins - step, 0)
         change = self._correlations(feature, above) - self._correlations(feature, below)
         change *= self._slopes(candidate, self._correlations(feature, bins))
-        for weights in candidate.inputs.directions:
+        for weights in candidate.inputs.directions:  # a feature moves the directions it is part of
             values, of_direction = self._direction(weights)
             of_samples, matrix = of_direction.bins(values), self._matrix(of_direction)
             shifts = [(moved - bins) / coding.size * weights[feature] for moved in (above, below)]

@@ -17,6 +17,7 @@ import numpy as np
 from sdnn.estimators.columns import Floats
 from sdnn.support.arguments import real
 
+# Chosen constants.
 N_ERRORS = 300  # errors of a stream that are remembered
 STEP = 0.02  # change of the level of a stream's intervals after an error
 

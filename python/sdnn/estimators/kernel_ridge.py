@@ -30,7 +30,7 @@ from sdnn.support.arguments import explains_names, flag, real
 AUTO = words("auto")
 DEGREES = (1, 2, 3)
 LARGEST_TARGET = 1e140  # so that sums of squares are finite
-LOG_STEEPNESS = (0.0, 5.0)  # bounds of the logarithm of the steepness of the softmax of scores
+LOG_STEEPNESS = (0.0, 5.0)  # chosen bounds of the logarithm of the softmax's steepness
 LOG_OF_TEN = np.log(10.0)
 
 
@@ -149,6 +149,7 @@ class BaseKernelRidge(CodedInputs):
 
     @staticmethod
     def _sample_counts(sample_weight: ArrayLike | None, n_samples: int) -> Floats:
+        """Return the checked weights of samples, by default 1, shape (n_samples,)."""
         counts = sample_weights(sample_weight, n_samples)
         return np.ones(n_samples) if counts is None else counts
 
@@ -162,10 +163,12 @@ class BaseKernelRidge(CodedInputs):
         *,
         models_errors: bool = False,
     ) -> tuple[Floats, Rows, ridge.Solution | None]:
-        """Learn ranges, kernel, settings and solution; samples weigh counts times factors.
+        """Learn ranges, kernel, settings and solution.
 
-        Returns the outputs of samples by models without them, the numbers of these samples, and
-        with `models_errors` a model of the logarithms of the sizes of their errors.
+        Shapes: targets (n_samples, n_outputs), counts and factors (n_samples,). A sample of count 2
+        stands for two; ``factors`` are the weights of classes. Returns the outputs of samples by
+        models without them, shape (n_rows, n_outputs), the numbers of these samples, and with
+        `models_errors` a model of the logarithms of the sizes of their errors.
         """
         if (largest := np.abs(targets).max()) > LARGEST_TARGET:
             raise ValueError(f"y must be within +-{LARGEST_TARGET:g}, got {largest:g}: scale it")
@@ -210,9 +213,11 @@ class BaseKernelRidge(CodedInputs):
         *,
         models_errors: bool,
     ) -> tuple[ridge.Solution, ridge.Solution | None]:
-        """Choose inputs and degree by leave-one-out errors; ``samples`` are those of the ``rows``.
+        """Set the inputs, kernel, degree and components with the least leave-one-out loss.
 
-        Returns the solution, and with `models_errors` that of the logarithms of the errors' sizes.
+        The ``rows`` of the table are the components, ``samples`` their targets and weights. The
+        degree has the least squared error, the inputs have the least loss of the estimator. Returns
+        the solution, and with `models_errors` that of the logarithms of the errors' sizes.
         """
         least = math.inf
         for inputs in possible:

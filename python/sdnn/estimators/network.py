@@ -18,6 +18,7 @@ from sdnn.estimators.columns import PAIR_BUDGET, Array, Floats, Ints, Pairs
 
 Rule = tuple[Array, float] | tuple[Ints, int, str]
 """Arguments of learning: (counts, share) of the p-delta rule, or (labels, n_classes, scheme)."""
+# Chosen constants, on which bits depend; `FEW_SAMPLES` and those below it only change the time.
 COLUMN_BUDGET = 16000  # columns divided among the pairs by default
 LARGE_COLUMN_BUDGET = 4000  # of many samples
 ENOUGH_UNITS = 178  # units per pattern, of all pairs of 10 inputs with either budget

@@ -11,6 +11,7 @@ from sdnn.coding import Coding
 from sdnn.coding.symbols import missing_as_nan, present
 from sdnn.estimators.columns import Array, Floats
 
+# Chosen constants.
 TAIL = 0.025  # share of values at either end that may be outliers
 FAR = 2.0  # gap beyond which values are outliers, in widths of the middle values
 FEWEST = 10  # values; smaller samples have no outliers
@@ -38,6 +39,7 @@ def usual_range(values: Floats) -> tuple[float, float]:
         low, high = middle_of(others)
         low, high = min(low, float(median)), max(high, float(median))
     with np.errstate(over="ignore"):
+        # Entry i tells whether a gap parts the values i and i + 1.
         gaps = np.diff(ordered) > FAR * (high - low)
     if len(ordered) < FEWEST or not gaps.any():
         return float(ordered[0]), float(ordered[-1])
