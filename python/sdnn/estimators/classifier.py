@@ -193,12 +193,15 @@ class SDNNClassifier(CodedClassifier, BaseSDNN):
 
     def _validate_to_begin(self) -> None:
         super()._validate_to_begin()
-        self._require_classes([])
+        self._refuse_class_weight()
 
-    def _require_classes(self, classes: ArrayLike | None) -> None:
-        """Raise ValueError for a class weight, which only `fit` uses, or missing first classes."""
+    def _refuse_class_weight(self) -> None:
         if self.class_weight is not None:
             raise ValueError(f"class_weight works in fit only, got {shown(self.class_weight)}")
+
+    def _require_classes(self, classes: ArrayLike | None) -> None:
+        """Raise ValueError for a class weight, or if the first call lacks the classes."""
+        self._refuse_class_weight()
         if classes is None and not hasattr(self, "network_"):
             raise ValueError("classes must be given in the first call of partial_fit or learn_one")
 

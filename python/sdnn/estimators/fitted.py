@@ -50,28 +50,12 @@ class Learned(BaseEstimator):
     steepness_: float
 
 
+PLAIN_TYPES = {"bool": bool, "float": float, "int": int, "str": str}
 ATTRIBUTES: dict[str, type] = {
-    "n_corrected_": np.ndarray,
-    "n_features_in_": int,
-    "n_inputs_out_of_range_": int,
-    "n_iter_": int,
-    "n_outputs_": int,
-    "n_outputs_out_of_range_": int,
-    "output_range_": np.ndarray,
-    "training_form_": str,
-    "training_memory_": int,
-    "validation_scores_": np.ndarray,
-    "_counts_of_range": int,
-    "_flat": bool,
-    "_n_units_each": int,
-    "_n_weighted": int,
-    "_scheme": str,
-    "_weight_seed": int,
-    "held_out_counts_": np.ndarray,
-    "held_out_residuals_": np.ndarray,
-    "steepness_": float,
+    name: PLAIN_TYPES.get(annotation, np.ndarray)
+    for name, annotation in Learned.__annotations__.items()
 }
-"""Types of the attributes of `Learned` in a file; what annotations hold depends on NumPy."""
+"""Types that files have for the attributes of `Learned`, whose annotations are text."""
 
 
 class Fitted(Learned):

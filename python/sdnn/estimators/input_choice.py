@@ -162,6 +162,7 @@ class InputChoice:
     ) -> None:
         self._table, self._samples = few_samples(table, codings, samples)
         self._codings, self._degrees, self._losses = list(codings), degrees, losses
+        self._degree: int | None = None  # that of the first candidate, then of all
         self._bins = [coding.bins(self._table[:, i]) for i, coding in enumerate(codings)]
         self._matrices: dict[object, Floats] = {}
         self._positions = positions(self._table, codings)
@@ -174,15 +175,19 @@ class InputChoice:
         self._variances = self._samples.variances
 
     def best(self) -> Inputs:
-        """Return the inputs with which errors are clearly smallest, by default all of them."""
+        """Return the inputs with which errors are clearly smallest, by default all of them.
+
+        Directions are sought among all features, and also among the selected ones if the selection
+        is clearly better.
+        """
         every = self._solve(all_inputs(len(self._codings)))
         selected = min(self._halvings(every), key=self._error, default=every)
-        starts = [every]
+        unmixed = [every]
         if self._is_better(selected, every):
-            starts.append(selected)
-        mixed = [self._with_directions(start) for start in starts]
-        candidates = [*(c for c in mixed if len(c.inputs.directions)), starts[-1]]
-        return min(candidates, key=self._error).inputs
+            unmixed.append(selected)
+        mixed = map(self._with_directions, unmixed)
+        candidates = [candidate for candidate in mixed if len(candidate.inputs.directions)]
+        return min([*candidates, unmixed[-1]], key=self._error).inputs
 
     def _matrix(self, coding: Coding) -> Floats:
         """Return the correlations of a coding's patterns, computed once for equal codings."""
@@ -219,12 +224,11 @@ class InputChoice:
         n_inputs = len(inputs.features) + len(inputs.directions)
         kernel = kernel_of_sums(total, squares, n_inputs)
         solutions = {}
-        for degree in self._degrees:
+        for degree in self._degrees if self._degree is None else [self._degree]:
             problem = diagonal(apply_degree(kernel.copy(), degree), self._samples)
             solutions[degree] = solve(problem, self._samples, None)
-        degree = min(solutions, key=lambda degree: solutions[degree].error)
-        self._degrees = [degree]  # later candidates have the degree of the first, with all inputs
-        solution = solutions[degree]
+        self._degree = min(solutions, key=lambda degree: solutions[degree].error)
+        solution = solutions[self._degree]
         losses = self._losses(self._samples, solution.left_out) * self._penalty(inputs)
         return Candidate(inputs, solution, losses, total, kernel)
 
@@ -275,9 +279,9 @@ class InputChoice:
         slopes: Floats = np.ones_like(correlations)
         if n > 1:
             slopes = (n - 1 + 2 * (candidate.total[self._few] - correlations)) / (2 * n * (n - 1))
-        if self._degrees[0] == 2:  # times the derivative of the polynomial in `apply_degree`
+        if self._degree == 2:  # times the derivative of the polynomial in `apply_degree`
             slopes *= 0.5 + candidate.kernel[self._few]
-        elif self._degrees[0] == 3:
+        elif self._degree == 3:
             slopes *= 3 * np.square(candidate.kernel[self._few])
         return slopes
 

@@ -159,8 +159,8 @@ class CodedInputs(BaseEstimator):
         Raises
         ------
         ValueError
-            For an impossible parameter, unusable data, or training that needs more than
-            ``memory_limit``.
+            For an impossible parameter, one that a warm start cannot follow, unusable data, or
+            training that needs more than ``memory_limit``.
         OverflowError
             Before a weight of a network could leave its range.
         """

@@ -179,18 +179,18 @@ class BaseKernelRidge(CodedInputs):
         self.codings_, possible = tuple(codings), [all_inputs(len(codings))]
         if isinstance(self.pairs, str) and self.inputs == "auto":
             possible = inputs_to_compare(codings, table, samples, degrees, self._losses)
-        components = np.arange(len(table))
-        if len(table) > self.max_components:
-            random = check_random_state(self.random_state)
-            components = np.sort(random.choice(components, self.max_components, replace=False))
         alpha = None if self.alpha == "auto" else real("alpha", self.alpha)
+        components = self._components(len(table))
         is_exact = len(components) == len(table)
-        # With low rank, half of the components choose inputs and degree, in an eighth of the time.
-        for rows in [components] if is_exact else [components[::2], components]:
-            solution, sizes = self._choose(
-                possible, degrees, table, rows, samples[rows], alpha, models_errors=models_errors
-            )
+        if (
+            not is_exact
+        ):  # half of the components choose inputs and degree, in an eighth of the time
+            rows = components[::2]
+            self._choose(possible, degrees, table, rows, samples[rows], alpha)
             possible, degrees = [self._inputs], (self.degree_,)
+        solution, sizes = self._choose(
+            possible, degrees, table, components, samples[components], alpha, models_errors
+        )
         self._of_samples = KernelOfSamples(self.kernel_, self.X_fit_, self.degree_)
         if not is_exact:
             table, kernel_of = self._inputs.of(table, codings), self._of_samples.matrix
@@ -202,6 +202,14 @@ class BaseKernelRidge(CodedInputs):
         self.dual_coef_, self.intercept_ = solution.dual, solution.intercept
         return solution.left_out, solution.rows, sizes
 
+    def _components(self, n_samples: int) -> Rows:
+        """Return the numbers of the samples that span the solution: all, or a random choice."""
+        every = np.arange(n_samples)
+        if n_samples <= self.max_components:
+            return every
+        random = check_random_state(self.random_state)
+        return np.sort(random.choice(every, self.max_components, replace=False))
+
     def _choose(
         self,
         possible: Sequence[Inputs],
@@ -210,8 +218,7 @@ class BaseKernelRidge(CodedInputs):
         rows: Rows,
         samples: ridge.Samples,
         alpha: float | None,
-        *,
-        models_errors: bool,
+        models_errors: bool = False,
     ) -> tuple[ridge.Solution, ridge.Solution | None]:
         """Set the inputs, kernel, degree and components with the least leave-one-out loss.
 

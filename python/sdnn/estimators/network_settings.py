@@ -9,7 +9,6 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -104,14 +103,20 @@ def settings_in_use(model: Estimator) -> Settings:
 
 def changed_settings(begun_with: Settings, settings: Settings, meaning: Meaning) -> list[str]:
     """Return the names of the settings with another meaning than before."""
-    with suppress(ValueError):  # lists with arrays cannot be compared at once
-        if settings == begun_with:  # fast: so it is before nearly every sample of a stream
-            return []
     return [
         name
         for name, value in begun_with.items()
-        if meaning(name, settings[name]) != meaning(name, value)
+        if not is_equal(settings[name], value)  # fast: it is called before each sample of a stream
+        and meaning(name, settings[name]) != meaning(name, value)
     ]
+
+
+def is_equal(first: object, second: object) -> bool:
+    """Return whether two values are equal by ``==``, which arrays of several values never are."""
+    try:
+        return bool(first == second)
+    except ValueError:
+        return False
 
 
 def change_error(name: str, old: object, new: object, learner: str, remedy: str) -> Exception:

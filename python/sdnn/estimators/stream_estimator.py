@@ -176,8 +176,8 @@ class StreamEstimator:
 
     def _settings(self) -> Settings:
         """Return the settings that a stream that has begun cannot follow."""
-        names = (*self.model._network_settings, "correction_share", "out_of_range")
-        of_model = {f"model.{name}": getattr(self.model, name) for name in names}
+        names = (*self.default_model._network_settings, "correction_share", "out_of_range")
+        of_model = {f"model.{name}": getattr(self.model, name, None) for name in names}
         return {"experts": self.experts, "follows_ranges": self.follows_ranges, **of_model}
 
     def _require_same_settings(self) -> None:
@@ -279,7 +279,7 @@ class StreamEstimator:
         counts = collections.Counter(
             name for x in self.samples for name in sorted(x) if x[name] is not None
         )
-        # A twentieth of the samples is enough while there are few of them.
+        # With fewer than 100 samples, a twentieth of them is enough.
         fewest = min(FEWEST, max(1, len(self.samples) // 20))
         frequent = [name for name, count in counts.items() if count >= fewest]
         if self._can_grow():
@@ -366,7 +366,7 @@ class StreamEstimator:
             if not (may_be_new and any(self._is_new(*item) for item in sample.items())):
                 return
             self.n_before_additions = self.n_learned - 1
-        n_last = self.n_learned - self.n_before_additions
+        n_last = self.n_learned - self.n_before_additions  # samples since the first addition
         if n_last < max(self.grace_period, min(self.n_learned // 10, REMEMBERED)):
             return
         self.n_before_additions = None
@@ -379,15 +379,19 @@ class StreamEstimator:
         except BaseException:
             self.reads, self.categories = before
             raise
-        if has_grown:
+        if (
+            has_grown
+        ):  # the new weights are 0; a model that is trained anew has learned these samples
             for x, y in list(zip(self.samples, self.targets, strict=True))[-n_last:]:
                 self._learn(self._sample(x), y)
 
     def _frequent_additions(self) -> tuple[list[str], dict[int, Coding]]:
-        """Return new features, and the extended coding of each feature with new categories.
+        """Return new features, and the extended codings of features with new categories.
 
-        Features and categories that fewer than `FEWEST` kept samples have are left out.
+        The latter are by the number of the feature. Features and categories that fewer than
+        `FEWEST` kept samples have are left out.
         """
+        # An addition is (name, category), or (name, None) for a new feature.
         counts = collections.Counter(
             (name, self.reads[name](value) if name in self.reads else None)
             for x in self.samples

@@ -211,33 +211,46 @@ def test_several_outputs_have_separate_intervals_and_samples_of_weight_0_are_not
     assert weighted.predict_interval(X[:2]).shape == (2, 2)
 
 
-def test_calibration_refuses_unsuitable_options_coverages_and_damaged_files(tmp_path):
+def test_calibration_refuses_single_units_few_samples_and_a_warm_start():
     X, y = noisy(40)
     for options in ({"n_units_per_class": 1}, {"scheme": "one_vs_one"}):
         refuses("calibrate", SDNNClassifier(**options, calibrate=True).fit, X, y > 0)
     refuses("calibrate", SDNNRegressor(calibrate=True).fit, X[:9], y[:9])
     refuses("calibrate", SDNNRegressor(calibrate=True, warm_start=True).fit, X, y)
+
+
+def test_intervals_need_a_calibration_and_enough_held_out_samples():
+    X, y = noisy(40)
     plain = SDNNRegressor(**OPTIONS).fit(X, y)
     refuses("calibrate", plain.predict_interval, X, error=AttributeError)
     model = SDNNRegressor(**OPTIONS, calibrate=True).fit(X, y)
     refuses("coverage", model.predict_interval, X, 0.95)  # the 8 held-out errors allow 8 / 9
     refuses("coverage", model.predict_interval, X, 1.0)
-    path = tmp_path / "damaged"
-    for name, wrong in (
-        ("held_out_residuals_", np.zeros((3, 1))),
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong"),
+    [
+        ("held_out_residuals_", np.zeros((3, 1))),  # a fifth of 40 samples is 8
         ("held_out_residuals_", np.full((8, 1), np.nan)),
         ("held_out_counts_", np.zeros(8)),
         ("held_out_counts_", np.ones(8, np.float32)),
-    ):
-        damaged = SDNNRegressor(**OPTIONS, calibrate=True).fit(X, y)
-        setattr(damaged, name, wrong)
-        damaged.save(path)
-        refuses("held-out", SDNNRegressor.load, path)
-    classes = SDNNClassifier(**OPTIONS, calibrate=True).fit(X, y > 0)
-    for steepness in (0.0, STEEPNESSES[1] + 1, float("nan")):
-        classes.steepness_ = steepness
-        classes.save(path)
-        refuses("steepness_", SDNNClassifier.load, path)
+    ],
+)
+def test_files_with_impossible_held_out_errors_are_refused(name, wrong, tmp_path):
+    damaged = SDNNRegressor(**OPTIONS, calibrate=True).fit(*noisy(40))
+    setattr(damaged, name, wrong)
+    damaged.save(tmp_path / "damaged")
+    refuses("held-out", SDNNRegressor.load, tmp_path / "damaged")
+
+
+@pytest.mark.parametrize("steepness", [0.0, STEEPNESSES[1] + 1, float("nan")])
+def test_files_with_a_steepness_out_of_range_are_refused(steepness, tmp_path):
+    X, y = noisy(40)
+    damaged = SDNNClassifier(**OPTIONS, calibrate=True).fit(X, y > 0)
+    damaged.steepness_ = steepness
+    damaged.save(tmp_path / "damaged")
+    refuses("steepness_", SDNNClassifier.load, tmp_path / "damaged")
 
 
 def test_classes_of_single_samples_or_of_weight_0_cannot_be_calibrated():

@@ -146,6 +146,7 @@ def stream(river, n_samples, **options):
         ("model.n_pattern_units", 32),
         ("model.output_range", (0, 1)),
         ("model.correction_share", 0.5),
+        ("model", SDNNClassifier()),
         ("experts", "network"),
         ("follows_ranges", False),
         ("coverage", 0.5),

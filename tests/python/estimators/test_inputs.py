@@ -48,13 +48,7 @@ def test_columns_that_do_not_exist_or_are_not_given_are_refused():
     refuses("coding", codings_of_columns, [("anchor",)], None, 3)
 
 
-def test_columns_that_are_not_listed_have_the_default_coding():
-    codings = codings_of_columns([("anchor", [1])], None, 3)
-    assert [coding.name for coding in codings] == ["random-inverse", "anchor", "random-inverse"]
-
-
-def test_pairs_are_ordered_and_may_be_names():
-    assert input_pairs("all", None, 3) == [(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)]
+def test_pairs_may_be_names_and_a_single_input_has_a_plain_pattern():
     assert input_pairs("all", None, 1) == [(0, 0)]
     assert input_pairs([("b", "a"), (-1, None)], ["a", "b"], 2) == [(1, 0), (1, 1)]
     refuses("pair", input_pairs, [(0, 1, 2)], None, 3)

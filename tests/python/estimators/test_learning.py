@@ -261,12 +261,14 @@ def test_single_units_and_one_versus_one_have_no_probabilities():
     refuses("one_vs_one", SDNNClassifier(scheme="one_vs_one", n_units_per_class=5).fit, X, LABELS)
 
 
-def test_predictions_average_the_networks_of_three_epochs(tmp_path):
-    noisy = Y + np.random.RandomState(1).normal(0, 0.5, len(Y))
-    options = {**REGRESSOR, "shuffle": False, "output_range": (-3, 3)}
-    model = SDNNRegressor(**options, max_iter=11, n_averaged_epochs=3).fit(X, noisy)
+NOISY = Y + np.random.RandomState(1).normal(0, 0.5, len(Y))
+AVERAGED = {**REGRESSOR, "shuffle": False, "output_range": (-3, 3)}
+
+
+def test_predictions_average_the_networks_of_three_epochs():
+    model = SDNNRegressor(**AVERAGED, max_iter=11, n_averaged_epochs=3).fit(X, NOISY)
     predictions = [
-        SDNNRegressor(**options, max_iter=n, n_averaged_epochs=1).fit(X, noisy).predict(X)
+        SDNNRegressor(**AVERAGED, max_iter=n, n_averaged_epochs=1).fit(X, NOISY).predict(X)
         for n in (6, 9, 11)  # the last epoch, and each third one before
     ]
     means, spread = model.predict(X, return_std=True)
@@ -274,14 +276,20 @@ def test_predictions_average_the_networks_of_three_epochs(tmp_path):
     np.testing.assert_allclose(spread, np.std(predictions, axis=0), atol=1e-12)
     assert spread.max() > 0
     assert model.predict_one(X[3]) == means[3]
-    # A saved model keeps the networks; online learning continues with the last one.
-    path = tmp_path / "model.safetensors"
-    model.save(path)
-    np.testing.assert_array_equal(SDNNRegressor.load(path).predict(X), means)
-    model.learn_one(X[0], Y[0])
-    assert model.predict(X, return_std=True)[1].max() == 0
-    plain = SDNNRegressor(**options, max_iter=11).fit(X, noisy)
-    assert_equal_weights(plain.learn_one(X[0], Y[0]), model)
+
+
+def test_a_saved_model_keeps_all_averaged_networks(tmp_path):
+    model = SDNNRegressor(**AVERAGED, max_iter=11, n_averaged_epochs=3).fit(X, NOISY)
+    model.save(tmp_path / "model.safetensors")
+    loaded = SDNNRegressor.load(tmp_path / "model.safetensors")
+    np.testing.assert_array_equal(loaded.predict(X), model.predict(X))
+
+
+def test_online_learning_continues_with_the_last_of_averaged_networks():
+    model = SDNNRegressor(**AVERAGED, max_iter=11, n_averaged_epochs=3).fit(X, NOISY)
+    plain = SDNNRegressor(**AVERAGED, max_iter=11, n_averaged_epochs=1).fit(X, NOISY)
+    assert_equal_weights(model.learn_one(X[0], Y[0]), plain.learn_one(X[0], Y[0]))
+    assert model.predict(X, return_std=True)[1].max() == 0, "a single network has no spread"
 
 
 def test_averaged_networks_count_towards_the_memory_limit():
