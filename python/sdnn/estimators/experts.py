@@ -212,7 +212,7 @@ class Experts(abc.ABC):
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Restore the attributes, and make the compiled models from their states."""
-        states = state.pop("states")
+        states = state.pop("states")  # of the mean, the linear regressions, the window, the mixture
         self.__dict__ = state
         self.mixture = self._mixture()
         self._make(states[1]["low"], states[1]["high"], len(states[0]["origins"]))

@@ -211,6 +211,8 @@ class Fitted(Learned):
         coding_entries(estimator.coding)
         estimator._begun_with = settings_of(estimator)
         for name, value in description.get("begun_with", {}).items():
+            if name not in cls._network_settings:
+                raise ValueError(f"begun_with.{name} is no setting of a network")
             estimator._begun_with[name] = restored(value)
         stored = {**description["attributes"], **arrays}
         for name, expected in ATTRIBUTES.items():
@@ -310,11 +312,7 @@ def array_of_names(name: str, stored: Mapping[str, Any]) -> Array:
 
 
 def require_consistent(estimator: Fitted) -> None:
-    """Raise ValueError if the attributes of a loaded estimator contradict each other.
-
-    Numbers of units, inputs and bins must agree; held-out residuals, their counts and the
-    steepness of probabilities must be in range.
-    """
+    """Raise ValueError unless numbers of units, inputs and bins of a loaded estimator agree."""
     attributes, network = vars(estimator), estimator.network_
     code = network.input_code
     seed_of(attributes["_weight_seed"])  # raises for a seed out of range
@@ -331,6 +329,11 @@ def require_consistent(estimator: Fitted) -> None:
         fits = fits and len(modifier) == code.codings[nu].size
     if not fits:
         raise ValueError("its parts do not fit together")
+    require_calibration(attributes)
+
+
+def require_calibration(attributes: Mapping[str, Any]) -> None:
+    """Raise ValueError for impossible held-out residuals or an impossible steepness, if any."""
     if "held_out_residuals_" in attributes or "held_out_counts_" in attributes:
         residuals, counts = attributes["held_out_residuals_"], attributes["held_out_counts_"]
         fits = residuals.dtype == counts.dtype == np.float64 and len(counts) > 0

@@ -25,7 +25,7 @@ def pairs_of_new(n_before: int, n_new: int, random: np.random.RandomState) -> Pa
     """
     pairs: Pairs = []
     for new in range(n_before, n_before + n_new):
-        others = np.arange(new)
+        others = np.arange(new)  # each pairs with the new input in both orders
         if (new + 1) * new > PAIR_BUDGET:
             others = random.permutation(others)[: max(1, PAIR_BUDGET // (2 * (new + 1)))]
         for other in np.sort(others).tolist():

@@ -113,6 +113,7 @@ def held_out_fifth(labels: Array, is_stratified: bool, seed: int) -> NDArray[np.
     order = np.random.RandomState(seed).permutation(len(labels))
     if is_stratified:
         order = order[np.argsort(labels[order], kind="stable")]
+    # From the middle of the first five on: of n samples, n / 5 rounded are held out.
     is_held = np.zeros(len(labels), dtype=bool)
     is_held[order[HELD_OUT_EVERY // 2 :: HELD_OUT_EVERY]] = True
     return is_held

@@ -138,8 +138,17 @@ def nested(depth):
         lambda description, arrays: description["attributes"].update(n_features_in_=2),
         lambda description, arrays: description["codings"][0].update(n_bins=3),
         lambda description, arrays: description["codings"].insert(0, nested(800)),
+        lambda description, arrays: description.update(begun_with={"max_iter": 3}),
     ],
-    ids=["two outputs", "other range", "no bool", "two features", "few bins", "nested codings"],
+    ids=[
+        "two outputs",
+        "other range",
+        "no bool",
+        "two features",
+        "few bins",
+        "nested codings",
+        "no setting of a network",
+    ],
 )
 def test_inconsistent_parts_of_a_file_are_refused_as_damage(change, tmp_path):
     path = tmp_path / "model.safetensors"
