@@ -26,7 +26,7 @@ typedef uint32_t sdnn_score;
 
 #define SDNN_IS_DUTCH 1
 #define SDNN_CRITIC_ROW 0 /* those of the actor come after it */
-#define SDNN_N_WEIGHTS SDNN_N_COLUMNS
+#define SDNN_N_WEIGHTS (UINT32_C(1) * SDNN_N_COLUMNS)
 #define SDNN_N_AVERAGED 0
 #define SDNN_MOST_LEARNED (UINT64_C(1) << 45)
 #define SDNN_N_ALL_WEIGHTS (UINT32_C(1) * SDNN_N_ROWS * SDNN_N_COLUMNS)

@@ -26,6 +26,7 @@ typedef uint32_t sdnn_score;
 #define SDNN_N_STATES (SDNN_N_STEPS + 1)
 #define SDNN_N_WORDS (UINT32_C(1) * SDNN_N_UNITS / 4 * SDNN_N_COLUMNS)
 #define SDNN_N_KEPT (SDNN_N_WORDS + SDNN_N_UNITS)
+#define SDNN_MOST_CHANGES (UINT32_C(2) * SDNN_MOST_COLUMNS)
 
 static const sdnn_coding sdnn_the_coding = {sdnn_patterns, sdnn_modified, sdnn_modifiers,
                                             sdnn_units};
@@ -117,18 +118,18 @@ static inline void sdnn_changes(const sdnn_code* from, const sdnn_code* to, sdnn
   for (j = 0; j < SDNN_N_COLUMNS; ++j) {
     for (; changes[j] > 0; --changes[j]) columns[(*n_positive)++] = (sdnn_column)j;
     for (; changes[j] < 0; ++changes[j])
-      columns[2 * SDNN_MOST_COLUMNS - ++*n_negative] = (sdnn_column)j;
+      columns[SDNN_MOST_CHANGES - ++*n_negative] = (sdnn_column)j;
   }
 }
 
 /* Computes the potentials of a state from those of a similar state, or by all columns. */
 static inline void sdnn_evaluate(const sdnn_agent* agent, sdnn_state* state,
                                  const sdnn_state* from) {
-  sdnn_column changes[2 * SDNN_MOST_COLUMNS];
+  sdnn_column changes[SDNN_MOST_CHANGES];
   uint32_t n_positive = 0, n_negative = 0, unit, i;
   const sdnn_column *positive = changes, *negative;
   if (from) sdnn_changes(&from->code, &state->code, changes, &n_positive, &n_negative);
-  negative = changes + 2 * SDNN_MOST_COLUMNS - n_negative;
+  negative = changes + SDNN_MOST_CHANGES - n_negative;
   if (!from || n_positive + n_negative > state->code.n_positive + state->code.n_negative) {
     from = 0;
     positive = state->code.columns;

@@ -48,7 +48,7 @@ static inline void sdnn_fire(const sdnn_network* network, const sdnn_code* code,
 /* The best action of a network: counts of firing units in windows, ranked, and ties broken. */
 static inline uint32_t sdnn_best_action(const sdnn_network* network, const uint32_t* bins) {
   sdnn_code code;
-  uint32_t fires[(SDNN_MOST_UNITS + 31) / 32];
+  uint32_t fires[(SDNN_MOST_UNITS + UINT32_C(31)) / 32];
   uint16_t ranks[SDNN_MOST_ACTIONS];
   uint32_t unit, action, first = 0, n_firing = 0, best = 0;
   sdnn_encode(&network->coding, bins, &code);

@@ -24,7 +24,7 @@ typedef struct {
 
 static const sdnn_pair sdnn_pairs[SDNN_N_PAIRS] = {SDNN_PAIRS};
 
-#define SDNN_PATTERN_BYTES ((SDNN_N_PATTERN_UNITS + 7) / 8)
+#define SDNN_PATTERN_BYTES ((SDNN_N_PATTERN_UNITS + UINT32_C(7)) / 8)
 
 /* The columns that are not 0: positive ones from the first on, negative ones at the end. */
 typedef struct {

@@ -89,7 +89,7 @@ static inline int sdnn_mix(double* x) {
 static inline int sdnn_outputs_of(const double* x, sdnn_real* outputs) {
   uint32_t bins[SDNN_N_INPUTS], j, k;
 #if SDNN_N_DIRECTIONS > 0
-  double values[SDNN_N_FEATURES + SDNN_N_DIRECTIONS];
+  double values[(uint32_t)SDNN_N_FEATURES + SDNN_N_DIRECTIONS];
   for (j = 0; j < SDNN_N_FEATURES; ++j) values[j] = x[j];
   if (!sdnn_mix(values) || !sdnn_bins_of(values, bins)) return 0;
 #else

@@ -11,7 +11,7 @@
 /* All that an estimator remembers, without pointers: a copy of the bytes is the same estimator. */
 typedef struct {
 #if !SDNN_IS_CLASSIFIER
-  sdnn_real ranges[2 * SDNN_N_OUTPUTS]; /* lowest and highest outputs */
+  sdnn_real ranges[UINT32_C(2) * SDNN_N_OUTPUTS]; /* lowest and highest outputs */
 #endif
   int32_t thresholds[SDNN_N_UNITS];
   int16_t weights[(uint32_t)SDNN_N_COLUMNS * SDNN_N_UNITS]; /* column by column */
@@ -48,7 +48,7 @@ static inline void sdnn_begin(sdnn_model* model) {
     model->largest[i] = sdnn_largest_weight(model, i);
   }
 #if !SDNN_IS_CLASSIFIER
-  for (i = 0; i < 2 * SDNN_N_OUTPUTS; ++i) model->ranges[i] = sdnn_ranges[i];
+  for (i = 0; i < UINT32_C(2) * SDNN_N_OUTPUTS; ++i) model->ranges[i] = sdnn_ranges[i];
 #endif
 }
 
@@ -300,14 +300,14 @@ static inline int sdnn_targets_of(const double* y, sdnn_real* ranges, int32_t* t
  * does, a target that is not finite, or where a weight would exceed 16 bits. */
 static inline int sdnn_learn(sdnn_model* model, const double* x, const double* y) {
   int32_t potentials[SDNN_N_UNITS], targets[SDNN_N_OUTPUTS];
-  sdnn_real ranges[2 * SDNN_N_OUTPUTS];
+  sdnn_real ranges[UINT32_C(2) * SDNN_N_OUTPUTS];
   sdnn_code code;
   uint32_t i;
-  for (i = 0; i < 2 * SDNN_N_OUTPUTS; ++i) ranges[i] = model->ranges[i];
+  for (i = 0; i < UINT32_C(2) * SDNN_N_OUTPUTS; ++i) ranges[i] = model->ranges[i];
   if (!sdnn_targets_of(y, ranges, targets) || !sdnn_is_within(x)) return 0;
   if (!sdnn_read(model, x, &code, potentials)) return 0;
   if (!sdnn_learn_targets(model, &code, potentials, targets)) return 0;
-  for (i = 0; i < 2 * SDNN_N_OUTPUTS; ++i) model->ranges[i] = ranges[i];
+  for (i = 0; i < UINT32_C(2) * SDNN_N_OUTPUTS; ++i) model->ranges[i] = ranges[i];
   return 1;
 }
 

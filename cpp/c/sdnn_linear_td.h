@@ -239,7 +239,7 @@ static inline void sdnn_end_traces(sdnn_agent* agent) {
   uint32_t row;
   for (row = 0; row < SDNN_N_ROWS; ++row) {
     if (agent->is_live[row]) {
-      sdnn_clear(&agent->traces[row * SDNN_N_COLUMNS], 4 * SDNN_N_COLUMNS);
+      sdnn_clear(&agent->traces[row * SDNN_N_COLUMNS], UINT32_C(4) * SDNN_N_COLUMNS);
     }
     agent->is_live[row] = 0;
   }

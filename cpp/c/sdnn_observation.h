@@ -20,7 +20,7 @@ typedef uint8_t sdnn_unit;
 #else
 typedef uint16_t sdnn_unit;
 #endif
-#define SDNN_PATTERN_BYTES ((SDNN_N_PATTERN_UNITS + 7) / 8)
+#define SDNN_PATTERN_BYTES ((SDNN_N_PATTERN_UNITS + UINT32_C(7)) / 8)
 
 /* The constants of a code. */
 typedef struct {

@@ -12,7 +12,7 @@
 #define SDNN_EPISODE_PARAMETER
 #define SDNN_EPISODE
 #define SDNN_MOST_NOTED (UINT64_C(1) << 40)
-#define SDNN_RANGES_BYTES (24 * SDNN_N_OBSERVED)
+#define SDNN_RANGES_BYTES (UINT32_C(24) * SDNN_N_OBSERVED)
 
 /* The moments of each observed number, and the ranges that follow from them. */
 typedef struct {
@@ -104,8 +104,8 @@ static inline int sdnn_are_ranges(const uint8_t* at) {
   uint32_t i;
   for (i = 0; i < SDNN_N_OBSERVED; ++i, at += 8) {
     if (sdnn_get(at, 8) > SDNN_MOST_NOTED ||
-        (sdnn_get(at + 8 * SDNN_N_OBSERVED, 8) & ~SDNN_MINUS) > most_mean ||
-        sdnn_get(at + 16 * SDNN_N_OBSERVED, 8) > most_square) {
+        (sdnn_get(at + UINT32_C(8) * SDNN_N_OBSERVED, 8) & ~SDNN_MINUS) > most_mean ||
+        sdnn_get(at + UINT32_C(16) * SDNN_N_OBSERVED, 8) > most_square) {
       return 0;
     }
   }

@@ -1,12 +1,17 @@
 """C headers of policies with other compilers and on other processors, against their agents."""
 
+import functools
+import itertools
 import re
+import subprocess
 
 import pytest
 
 from bare_processors import BARE_TARGETS
+from c_estimators import fitted
 from c_histories import POLICIES, actor_observer, check_policy, policy
 from c_keeping import check_best, cut_power
+from c_kernel_estimators import fitted_kernel
 from c_learners import LEARNERS, TIMED, actor, check_learning, exported, network, several, states
 from c_policies import (
     AGENTS,
@@ -21,7 +26,7 @@ from c_policies import (
     run,
     write_policy,
 )
-from sdnn.export import export_c_header
+from sdnn.export import c_header, estimator_header, export_c_header
 
 ARM = TARGETS["arm"]
 
@@ -125,6 +130,45 @@ def test_learning_compiles_where_int_has_16_bits(name, needs, tmp_path):
     (tmp_path / "agent.c").write_text('#include "agent.h"\n')
     options = (*STRICT, "-ffreestanding", "-Wno-unused-function", "--target=msp430")
     run("clang", *options, "-fsyntax-only", tmp_path / "agent.c")
+
+
+SIZE = re.compile(r"#define (AGENT_(?:N|MOST)_\w+) \d+$", re.MULTILINE)
+NEVER_LARGE = ("AGENT_N_STEPS", "AGENT_N_DIMENSIONS", "AGENT_N_UNIT_BITS")
+"""Sizes that settings keep far below 2^15: n_steps is at most 1,000."""
+SIZED = {
+    **{
+        name: functools.partial(exported, name) for name in ("network", "observer", "actor-running")
+    },
+    "policy": lambda: c_header(agents()["pairs"], "agent"),
+    "classes": lambda: estimator_header(fitted("categories")[0], "agent"),
+    "regressor": lambda: estimator_header(fitted("several-outputs")[0], "agent", learning=True),
+    "kernel": lambda: estimator_header(fitted_kernel("directions")[0], "agent"),
+}
+
+
+@pytest.mark.parametrize("header_of", SIZED.values(), ids=SIZED)
+def test_arithmetic_of_large_sizes_does_not_overflow_an_int_of_16_bits(header_of, needs, tmp_path):
+    """Each size is made large in turn: 4 * 8192 and 32767 + 1 are the first that overflow."""
+    needs("clang")
+    sizes, code = header_of().text.split("static const", 1)
+    sizes = re.sub("(AGENT_N_ROWS) .*", r"\1 1", sizes)  # clang skips arrays of 64 kB and more
+    for name, size in itertools.product(set(SIZE.findall(sizes)) - {*NEVER_LARGE}, (8192, 32767)):
+        large = re.sub(f"(define {name}) .*", rf"\1 {size}", sizes)
+        (tmp_path / "agent.h").write_text(f"{large}static const{code}")
+        (tmp_path / "agent.c").write_text('#include "agent.h"\n')
+        options = (
+            "-std=c99",
+            "-ffreestanding",
+            "--target=msp430",
+            "-fsyntax-only",
+            "-ferror-limit=0",
+        )
+        warnings = ("-Wno-everything", "-Winteger-overflow")
+        clang = subprocess.run(
+            ["clang", *options, *warnings, tmp_path / "agent.c"], capture_output=True, text=True
+        )
+        overflows = re.findall(".*(?:overflow in expression|negative size).*", clang.stderr)
+        assert overflows == [], f"{name} {size}"
 
 
 def test_discrete_observations_are_one_hot_on_other_processors(target, tmp_path):
