@@ -76,10 +76,7 @@ def instruction_set() -> str:
     ValueError
         If SDNN_INSTRUCTION_SET names one that does not exist, or that this processor lacks.
     """
-    try:
-        return _core.instruction_set()
-    except ValueError as error:
-        raise ValueError(f"SDNN_INSTRUCTION_SET: {error}") from None
+    return _core.instruction_set()
 
 
 def available_instruction_sets() -> tuple[str, ...]:

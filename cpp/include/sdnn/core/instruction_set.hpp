@@ -1,4 +1,4 @@
-/// The choice of vector instructions for the kernels, once at run time.
+/// The choice at run time of the vector instructions that kernels use.
 #pragma once
 
 #include <array>
@@ -26,8 +26,8 @@
 
 namespace sdnn::core {
 
-/// Levels of instruction sets, in rising order for each processor. Results have the same bits on
-/// all of them.
+/// Levels of instruction sets. Those of one processor are in rising order: x86 has portable, avx2
+/// and avx512, Arm has portable and neon. Results have the same bits on all of them.
 enum class InstructionSet {
   portable,  ///< plain loops
   neon,      ///< Arm's Advanced SIMD
@@ -75,29 +75,27 @@ inline InstructionSet best_instruction_set() noexcept {
   return best;
 }
 
-/// The level called `name`. Throws std::invalid_argument if the level does not exist or is not
-/// available.
-inline InstructionSet instruction_set_named(std::string_view name) {
+/// Returns the level called `name`. Throws std::invalid_argument, with all names that this
+/// processor accepts, for any other name; `source` says where the name comes from.
+inline InstructionSet instruction_set_named(std::string_view name, const std::string& source) {
+  std::string accepted;
   for (const InstructionSet level : kInstructionSets) {
-    if (name != name_of(level)) continue;
-    if (!offers(level)) {
-      fail(std::invalid_argument("instruction set must be one that this processor offers (up to " +
-                                 std::string(name_of(best_instruction_set())) + "), got " +
-                                 std::string(name)));
-    }
-    return level;
+    if (!offers(level)) continue;
+    if (name == name_of(level)) return level;
+    accepted.append(accepted.empty() ? "" : ", ").append(name_of(level));
   }
-  fail(std::invalid_argument("instruction set must be portable, neon, avx2 or avx512, got " +
+  fail(std::invalid_argument(source + " must be one of " + accepted + " on this processor, got " +
                              std::string(name)));
 }
 
 namespace detail {
 
-/// The instruction set in use: the one that SDNN_INSTRUCTION_SET names, or the processor's best.
+/// The level in use: at first that of SDNN_INSTRUCTION_SET or, without it, the processor's best.
 inline std::atomic<InstructionSet>& active_level() {
   static std::atomic<InstructionSet> level = [] {
-    const char* const requested = std::getenv("SDNN_INSTRUCTION_SET");
-    return requested == nullptr ? best_instruction_set() : instruction_set_named(requested);
+    constexpr const char* kVariable = "SDNN_INSTRUCTION_SET";
+    const char* const name = std::getenv(kVariable);
+    return name == nullptr ? best_instruction_set() : instruction_set_named(name, kVariable);
   }();
   return level;
 }
@@ -112,9 +110,10 @@ inline InstructionSet instruction_set() {
   return detail::active_level().load(std::memory_order_relaxed);
 }
 
-/// Forces a level for the whole process. Throws std::invalid_argument if it is not available.
+/// Forces a level for the whole process. Throws std::invalid_argument unless it is offered.
 inline void set_instruction_set(std::string_view name) {
-  detail::active_level().store(instruction_set_named(name), std::memory_order_relaxed);
+  const InstructionSet level = instruction_set_named(name, "instruction set");
+  detail::active_level().store(level, std::memory_order_relaxed);
 }
 
 }  // namespace sdnn::core
