@@ -37,7 +37,7 @@ using environments::AcrobotState;
 std::uint64_t trial_seed(std::uint32_t root_seed, std::string_view case_id) {
   const std::uint32_t case_word = core::detail::crc32(std::as_bytes(std::span(case_id)));
   const std::array<std::uint32_t, 6> entropy{root_seed, 0, 0, 0, case_word, 0};
-  return core::Pcg64::drawn_from(entropy)[0] >> 1U;
+  return core::Pcg64::generated_state(entropy)[0] >> 1U;
 }
 
 /// A trial that is watched decision by decision.

@@ -21,8 +21,7 @@ struct ExpectedDraws {
   std::uint64_t bits;
 };
 
-// Expected numbers of numpy.random.Generator(PCG64(SeedSequence(seeds))): integers, random,
-// integers, raw.
+// Numbers of numpy.random.Generator(PCG64(SeedSequence(seeds))): integers, random, integers, raw.
 TEST(Pcg64, DrawsTheNumbersOfNumPy) {
   const std::vector<ExpectedDraws> drawn = {
       {{0}, {5, 4, 3, 1, 2}, 0.016527635528529094, 42963, 15002187965291974971U},
@@ -44,10 +43,10 @@ TEST(Pcg64, DrawsTheNumbersOfNumPy) {
 
 TEST(Pcg64, DrawsTheWordsOfNumPysSeedSequence) {
   // np.random.SeedSequence([1, 2, 3, 4, 5, 6]).generate_state(4, np.uint64)
-  const std::array<std::uint32_t, 6> words{1, 2, 3, 4, 5, 6};
+  const std::array<std::uint32_t, 6> entropy{1, 2, 3, 4, 5, 6};
   const std::array<std::uint64_t, 4> expected{16991237094181161505U, 14981931853785751691U,
                                               11178459300072584630U, 1971961610505447179U};
-  EXPECT_EQ(Pcg64::drawn_from(words), expected);
+  EXPECT_EQ(Pcg64::generated_state(entropy), expected);
 }
 
 TEST(Pcg64, ContinuesFromItsStateAndRefusesDamagedOnes) {

@@ -25,8 +25,8 @@ std::string file_of(const std::string& header, const std::string& data) {
   return length + header + data;
 }
 
-/// The header that the safetensors library writes for example_content() with the metadata "text",
-/// and its data.
+/// Header and data that the safetensors library writes for example_content() with the metadata
+/// "text".
 const std::string kHeader =
     R"({"__metadata__":{"sdnn":"text"},"b":{"dtype":"F64","shape":[1],"data_offsets":[0,8]},)"
     R"("a":{"dtype":"I16","shape":[2,1],"data_offsets":[8,12]},)"

@@ -139,14 +139,14 @@ TEST(State, OmitsMissingOptionalMembersAndRestoresNumberedParts) {
   testing::expect_refused(restored, bad, "state: other.10.value must not be there");
 }
 
-// taking(name, restore) calls restore, and adds the tensor's name to the message of its error.
+// naming(name, use) calls use, and adds the tensor's name to the message of its error.
 TEST(StateReader, NamesTheTensorThatCouldNotBeRestored) {
   const State state;
   StateReader reader(state);
   reader.prefix = "net.";
-  EXPECT_NO_THROW(reader.taking("weights", [] {}));
+  EXPECT_NO_THROW(reader.naming("weights", [] {}));
   const auto bad = [] { throw std::invalid_argument("weight must be small, got 9"); };
-  EXPECT_EQ(testing::message_of([&] { reader.taking("weights", bad); }),
+  EXPECT_EQ(testing::message_of([&] { reader.naming("weights", bad); }),
             "state: net.weights must be such that weight must be small, got 9");
 }
 

@@ -287,11 +287,11 @@ class SDNNC {
     if constexpr (Archive::kReads) {
       const bool is_mean = self.counts_.mean_error >= 0.0 && self.counts_.mean_error <= 1e302;
       archive.expect(is_mean, "mean_error", "finite and at least 0");
-      archive.taking("output_range", [&] { self.set_output_range(range[0], range[1]); });
+      archive.naming("output_range", [&] { self.set_output_range(range[0], range[1]); });
       for (const std::int32_t threshold : thresholds) {
         archive.expect(HiddenLayer::is_threshold(threshold), "thresholds", "of less than 2^30");
       }
-      archive.taking("weights", [&] { self.replace_parameters(std::span(weights), thresholds); });
+      archive.naming("weights", [&] { self.replace_parameters(std::span(weights), thresholds); });
       self.averaged_.reset();
     }
   }

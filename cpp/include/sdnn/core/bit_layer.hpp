@@ -10,15 +10,14 @@
 
 namespace sdnn::core {
 
-/// A word of 64 binary units. Only a std::bitset of this size has portable access to its word
-/// (to_ullong); rows of words form layers of any size.
+/// A word of 64 binary units; rows of words form layers of any size. The standard gives access to
+/// the bits of a std::bitset as a number, by to_ullong, up to this size.
 using BitWord = std::bitset<64>;
 
 /// The number of words that hold `n_units` binary units.
 constexpr std::size_t n_bit_words(std::size_t n_units) noexcept { return (n_units + 63) / 64; }
 
-/// A view of `size` binary units in a row of words; unit i is bit i % 64 of word i / 64, and the
-/// padding of the last word is zero.
+/// A view of binary units: unit i is bit i % 64 of word i / 64; the last word is padded with 0.
 class BitLayer {
  public:
   BitLayer(const BitWord* words, std::size_t size) noexcept : words_(words), size_(size) {}
@@ -48,6 +47,7 @@ class BitLayer {
   template <class Visit>
   void for_each_set(Visit&& visit) const {
     for (std::size_t w = 0; w < n_words(); ++w) {
+      // rest & (rest - 1) is `rest` without its lowest bit: 0b1100 & 0b1011 = 0b1000.
       for (unsigned long long rest = words_[w].to_ullong(); rest != 0; rest &= rest - 1) {
         visit(w * 64 + static_cast<std::size_t>(std::countr_zero(rest)));
       }

@@ -1,5 +1,5 @@
-/// The fields of a configuration, with name, member, documentation and bounds. Each is listed once,
-/// for checks, files and the bindings, and through these for the command line.
+/// The fields of configurations. A configuration lists each field once, in its `fields()`: name,
+/// member, documentation and bounds. Checks, files, bindings and the command line follow from it.
 #pragma once
 
 #include <array>
@@ -21,7 +21,7 @@
 
 namespace sdnn::core {
 
-/// The finite numbers that a field may have, from `low` to `high`.
+/// Bounds of a field's numbers, which are finite: [low, high] or, with `excludes_low`, (low, high].
 struct Bounds {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
@@ -37,7 +37,7 @@ constexpr Bounds above_up_to(double low, double high) noexcept {
   return {.low = low, .high = high, .excludes_low = true};
 }
 
-/// An enumeration whose values have names: `words_of(value)` returns them in the order of values.
+/// An enumeration for which `words_of(value)` returns the names of all values, in their order.
 template <class Enum>
 concept HasWords = std::is_enum_v<Enum> && requires(Enum value) {
   { words_of(value)[0] } -> std::convertible_to<std::string_view>;
@@ -55,7 +55,7 @@ struct ConfigField {
   constexpr Value& of(Config& config) const noexcept { return config.*member; }
 };
 
-/// A member of a configuration that is itself a member of a larger one.
+/// A member of a part, `outer`, of a configuration.
 template <class Config, class Inner, class Value>
 struct NestedField {
   const char* name;
@@ -68,7 +68,6 @@ struct NestedField {
   constexpr Value& of(Config& config) const noexcept { return config.*outer.*member; }
 };
 
-/// The field called `name`. `doc` describes it in the documentation.
 template <class Config, class Value>
 constexpr ConfigField<Config, Value> field(const char* name, Value Config::* member,
                                            const char* doc, Bounds bounds = {}) noexcept {
@@ -80,7 +79,7 @@ template <class Field, class Config>
 using FieldValue =
     std::remove_cvref_t<decltype(std::declval<const Field&>().of(std::declval<const Config&>()))>;
 
-/// The fields of `member`, as fields of the configuration that it is a part of.
+/// Returns the fields of a part of a configuration as fields of the whole.
 template <class Config, class Inner>
 constexpr auto nested_fields(Inner Config::* member) noexcept {
   return std::apply(
@@ -93,27 +92,27 @@ constexpr auto nested_fields(Inner Config::* member) noexcept {
 
 /// Describes bounds: "in [0, 1]".
 inline std::string words_of(const Bounds& bounds, bool is_whole) {
-  std::ostringstream words;
-  const auto write = [&words](double number) -> std::ostream& {
+  std::ostringstream text;
+  const auto write = [&text](double number) -> std::ostream& {
     if (number == std::floor(number) && std::abs(number) < 1e15) {
-      return words << static_cast<long long>(number);
+      return text << static_cast<long long>(number);  // 10000000 instead of 1e+07
     }
-    return words << number;
+    return text << number;
   };
   if (std::isfinite(bounds.high)) {
-    words << (bounds.excludes_low ? "in (" : "in [");
+    text << (bounds.excludes_low ? "in (" : "in [");
     write(bounds.low) << ", ";
     write(bounds.high) << ']';
   } else if (!std::isfinite(bounds.low)) {
-    words << "finite";
+    text << "finite";
   } else if (bounds.excludes_low) {
-    words << "a finite number greater than ";
+    text << "a finite number greater than ";
     write(bounds.low);
   } else {
-    words << (is_whole ? "at least " : "finite and at least ");
+    text << (is_whole ? "at least " : "finite and at least ");
     write(bounds.low);
   }
-  return words.str();
+  return text.str();
 }
 
 /// Throws ArgumentError unless the value, or each item of a list, is within its bounds.

@@ -2,7 +2,8 @@
 ///
 /// std::sin and std::log may differ in the last bit between mathematical libraries, and a single
 /// bit may change the outcome of a training. These functions use only IEEE + - * / sqrt and bit
-/// operations; they need contraction of a * b + c to be off (as in the CMake target).
+/// operations. The compiler must not contract a * b + c (see detail/floating_point.hpp). "Our"
+/// polynomials have coefficients that were fitted for this file.
 #pragma once
 
 #include <array>
@@ -29,7 +30,7 @@ struct BasicSinCos {
 };
 using SinCos = BasicSinCos<double>;
 
-/// The largest |x| of sin_cos.
+/// The largest |x| for which sin_cos returns numbers.
 inline constexpr double kSinCosLimit = 1e5;
 
 namespace detail {
@@ -58,13 +59,13 @@ template <class Real>
 SDNN_INLINE BasicSinCos<Real> sin_cos(const Real& x) noexcept {
   constexpr std::uint64_t kSignBit = std::uint64_t{1} << 63;
   constexpr double kTwoOverPi = 0x1.45f306dc9c883p-1;
-  constexpr double kRounder = 0x1.8p52;  // adding it leaves the nearest integer in the low bits
+  constexpr double kRounder = 0x1.8p52;  // the low bits of x + kRounder are the nearest integer
   constexpr double kHalfPi1 = 0x1.921fb5444p+0, kHalfPi2 = 0x1.68c234c4cp-39;
   constexpr double kHalfPi3 = 0x1.98a2e03707345p-77;
 
   const auto sign = bits_of(x) & kSignBit;
   const Real a = magnitude(x);
-  const Real poison =
+  const Real zero_or_nan =  // NaN beyond the range; it is added to the result's rounding errors
       select(a <= kSinCosLimit, Real(0.0), Real(std::numeric_limits<double>::quiet_NaN()));
 
   // Reduces |x| to n pi/2 + r + tail with |r| <= pi/4. The products n kHalfPi1 and n kHalfPi2 have
@@ -75,7 +76,7 @@ SDNN_INLINE BasicSinCos<Real> sin_cos(const Real& x) noexcept {
   const Real coarse = a - n * kHalfPi1;
   const Real correction = n * kHalfPi2;
   const Real r = coarse - correction;
-  const Real tail = ((coarse - r) - correction) - n * kHalfPi3 + poison;
+  const Real tail = ((coarse - r) - correction) - n * kHalfPi3 + zero_or_nan;
 
   const Real z = r * r, z2 = z * z, z4 = z2 * z2;
   const Real sin_poly = ((-0x1.5555555555548p-3 + 0x1.111111110f77cp-7 * z) +
@@ -90,6 +91,9 @@ SDNN_INLINE BasicSinCos<Real> sin_cos(const Real& x) noexcept {
   const auto cosine =
       bits_of(Real(one_minus + (((1.0 - one_minus) - half_z - r * tail) + z2 * cos_poly)));
 
+  // In odd quadrants sine and cosine change places: x ^ (x ^ y) is y, and 0 - 1 has all bits set.
+  // The sine is negated in quadrants 2 and 3, and for negative x; the cosine in 1 and 2. Bit 1 of
+  // the quadrant, or of the quadrant + 1, becomes the sign bit, 63.
   const auto swap = (sine ^ cosine) & (std::uint64_t{0} - (quadrant & 1));
   const auto sin_sign = ((quadrant & 2) << 62) ^ sign;
   const auto cos_sign = ((quadrant + 1) & 2) << 62;
@@ -144,7 +148,7 @@ inline double log(double x) noexcept {
 /// p(r) with our polynomial (relative error 2^-59.8), summed so that the large parts are exact.
 inline double exp(double x) noexcept {
   constexpr double kLog2Inverse = 0x1.71547652b82fep+0;
-  constexpr double kRounder = 0x1.8p52;  // adding it leaves the nearest integer in the low bits
+  constexpr double kRounder = 0x1.8p52;  // the low bits of x + kRounder are the nearest integer
   constexpr double kLog2High = 0x1.62e42fefa38p-1, kLog2Low = 0x1.ef35793c7673p-45;
   constexpr double kLowest = -746.0, kHighest = 710.0;  // e^x is 0 and infinity from here on
   constexpr std::uint64_t kTwiceBias = 2 * 1023;
@@ -168,7 +172,8 @@ inline double exp(double x) noexcept {
   const double rest = (1.0 - one_plus) + r;  // the rounding error of the sum
   const double mantissa = one_plus + (rest + (tail + (0.5 * z + (r * z) * poly)));
 
-  // 2^n has two factors because n may leave the range of exponents.
+  // 2^n is the product of two powers, 2^(n / 2) rounded down and the rest, because n may leave the
+  // range of exponents. A double with the exponent bits e and no mantissa is 2^(e - 1023).
   const std::uint64_t biased =
       std::bit_cast<std::uint64_t>(shifted) - std::bit_cast<std::uint64_t>(kRounder) + kTwiceBias;
   const std::uint64_t half = biased >> 1;
@@ -206,7 +211,7 @@ inline double atan2(double y, double x) noexcept {
   const bool is_steep = b > a;
   if (is_steep) std::swap(a, b);
   double r = 0.0, tail = 0.0;
-  std::size_t eighths = 0;  // the angle between the nearer axis and the point: r's, and this
+  std::size_t eighths = 0;  // multiples of pi / 4 that are added to atan r
   if (b > std::numeric_limits<double>::max()) {
     eighths = 1;  // both are infinite
   } else if (b > 0.0) {
@@ -246,38 +251,26 @@ inline double normal_quantile(double p) noexcept {
                                     1.9715909503065514427e3, 1.3731693765509461125e4,
                                     4.5921953931549871457e4, 6.7265770927008700853e4,
                                     3.3430575583588128105e4, 2.5090809287301226727e3};
-  constexpr Coefficients kCentreBottom{1.0,
-                                       4.2313330701600911252e1,
-                                       6.8718700749205790830e2,
-                                       5.3941960214247511077e3,
-                                       2.1213794301586595867e4,
-                                       3.9307895800092710610e4,
-                                       2.8729085735721942674e4,
-                                       5.2264952788528545610e3};
+  constexpr Coefficients kCentreBottom{1.0000000000000000000e0, 4.2313330701600911252e1,
+                                       6.8718700749205790830e2, 5.3941960214247511077e3,
+                                       2.1213794301586595867e4, 3.9307895800092710610e4,
+                                       2.8729085735721942674e4, 5.2264952788528545610e3};
   constexpr Coefficients kMiddleTop{1.42343711074968357734e0,  4.63033784615654529590e0,
                                     5.76949722146069140550e0,  3.64784832476320460504e0,
                                     1.27045825245236838258e0,  2.41780725177450611770e-1,
                                     2.27238449892691845833e-2, 7.74545014278341407640e-4};
-  constexpr Coefficients kMiddleBottom{1.0,
-                                       2.05319162663775882187e0,
-                                       1.67638483018380384940e0,
-                                       6.89767334985100004550e-1,
-                                       1.48103976427480074590e-1,
-                                       1.51986665636164571966e-2,
-                                       5.47593808499534494600e-4,
-                                       1.05075007164441684324e-9};
+  constexpr Coefficients kMiddleBottom{1.0000000000000000000e0,   2.05319162663775882187e0,
+                                       1.67638483018380384940e0,  6.89767334985100004550e-1,
+                                       1.48103976427480074590e-1, 1.51986665636164571966e-2,
+                                       5.47593808499534494600e-4, 1.05075007164441684324e-9};
   constexpr Coefficients kTailTop{6.65790464350110377720e0,  5.46378491116411436990e0,
                                   1.78482653991729133580e0,  2.96560571828504891230e-1,
                                   2.65321895265761230930e-2, 1.24266094738807843860e-3,
                                   2.71155556874348757815e-5, 2.01033439929228813265e-7};
-  constexpr Coefficients kTailBottom{1.0,
-                                     5.99832206555887937690e-1,
-                                     1.36929880922735805310e-1,
-                                     1.48753612908506148525e-2,
-                                     7.86869131145613259100e-4,
-                                     1.84631831751005468180e-5,
-                                     1.42151175831644588870e-7,
-                                     2.04426310338993978564e-15};
+  constexpr Coefficients kTailBottom{1.0000000000000000000e0,   5.99832206555887937690e-1,
+                                     1.36929880922735805310e-1, 1.48753612908506148525e-2,
+                                     7.86869131145613259100e-4, 1.84631831751005468180e-5,
+                                     1.42151175831644588870e-7, 2.04426310338993978564e-15};
   const auto ratio = [](const Coefficients& top, const Coefficients& bottom, double x) {
     return detail::polynomial(top, x) / detail::polynomial(bottom, x);
   };

@@ -36,12 +36,10 @@ using SizeError = NamedError<std::length_error>;
 
 #if !SDNN_EXCEPTIONS
 
-/// A function that handles the message of an error and does not return; it may restart the
-/// processor.
+/// A function that handles an error's message and does not return, but restarts the device, say.
 using ErrorHandler = void (*)(const char* message);
 
-/// The current handler; the default writes the message to standard error. The program is aborted if
-/// a handler returns.
+/// The handler; by default it writes to standard error. If it returns, the program is aborted.
 inline ErrorHandler& error_handler() noexcept {
   static ErrorHandler handler = [](const char* message) {
     std::fprintf(stderr, "sdnn: %s\n", message);
@@ -51,8 +49,7 @@ inline ErrorHandler& error_handler() noexcept {
 
 #endif
 
-/// Throws `error`. Compiled without exceptions (-fno-exceptions), hands its message to
-/// error_handler() and aborts.
+/// Throws `error`. Without exceptions (-fno-exceptions), calls error_handler() and aborts.
 template <class Error>
 [[noreturn]] void fail(const Error& error) {
 #if SDNN_EXCEPTIONS

@@ -24,12 +24,12 @@ class Pcg64 {
  public:
   /// Seeds like NumPy's PCG64(SeedSequence(seeds)).
   explicit Pcg64(std::span<const std::uint64_t> seeds) noexcept {
-    std::vector<std::uint32_t> words;  // integers in the form of NumPy, without leading zeros
+    std::vector<std::uint32_t> entropy;  // as NumPy splits seeds: low half first, no leading zeros
     for (const std::uint64_t seed : seeds) {
-      words.push_back(static_cast<std::uint32_t>(seed));
-      if (seed >> 32U != 0) words.push_back(static_cast<std::uint32_t>(seed >> 32U));
+      entropy.push_back(static_cast<std::uint32_t>(seed));
+      if (seed >> 32U != 0) entropy.push_back(static_cast<std::uint32_t>(seed >> 32U));
     }
-    const std::array<std::uint64_t, 4> drawn = drawn_from(words);
+    const std::array<std::uint64_t, 4> drawn = generated_state(entropy);
     increment_ = {(drawn[2] << 1U) | (drawn[3] >> 63U), (drawn[3] << 1U) | 1U};
     advance();
     state_ = sum(state_, {drawn[0], drawn[1]});
@@ -60,19 +60,21 @@ class Pcg64 {
   /// Lists the members that are saved and restored; see core/state.hpp.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
-    std::array<std::uint64_t, 6> words{self.state_.high,    self.state_.low, self.increment_.high,
-                                       self.increment_.low, self.has_half_,  self.half_};
-    archive.fixed("words", {words.size()}, words);
+    std::array<std::uint64_t, 6> members{self.state_.high,    self.state_.low, self.increment_.high,
+                                         self.increment_.low, self.has_half_,  self.half_};
+    archive.fixed("words", {members.size()}, members);
     if constexpr (Archive::kReads) {
-      self.state_ = {words[0], words[1]};
-      self.increment_ = {words[2], words[3]};
-      self.has_half_ = words[4] != 0;
-      self.half_ = static_cast<std::uint32_t>(words[5]);
+      self.state_ = {members[0], members[1]};
+      self.increment_ = {members[2], members[3]};
+      self.has_half_ = members[4] != 0;
+      self.half_ = static_cast<std::uint32_t>(members[5]);
     }
   }
 
-  /// Words that a SeedSequence of these words generates, with the constants of its definition.
-  static std::array<std::uint64_t, 4> drawn_from(std::span<const std::uint32_t> words) noexcept {
+  /// Returns NumPy's SeedSequence(entropy).generate_state(4, uint64), with the constants of its
+  /// definition: mixes the entropy into a pool of four numbers, and hashes these twice.
+  static std::array<std::uint64_t, 4> generated_state(
+      std::span<const std::uint32_t> entropy) noexcept {
     std::uint32_t constant = 0x43b0d7e5;
     const auto hashed = [&constant](std::uint32_t value) {
       value ^= constant;
@@ -85,14 +87,16 @@ class Pcg64 {
       return value ^ (value >> 16U);
     };
     std::array<std::uint32_t, 4> pool{};
-    for (std::size_t i = 0; i < pool.size(); ++i) pool[i] = hashed(i < words.size() ? words[i] : 0);
+    for (std::size_t i = 0; i < pool.size(); ++i) {
+      pool[i] = hashed(i < entropy.size() ? entropy[i] : 0);
+    }
     for (std::size_t from = 0; from < pool.size(); ++from) {
       for (std::size_t to = 0; to < pool.size(); ++to) {
         if (from != to) pool[to] = mixed(pool[to], hashed(pool[from]));
       }
     }
-    for (std::size_t from = pool.size(); from < words.size(); ++from) {
-      for (std::uint32_t& word : pool) word = mixed(word, hashed(words[from]));
+    for (std::size_t from = pool.size(); from < entropy.size(); ++from) {
+      for (std::uint32_t& number : pool) number = mixed(number, hashed(entropy[from]));
     }
     constant = 0x8b51f9dd;
     std::array<std::uint64_t, 4> drawn{};
@@ -107,6 +111,7 @@ class Pcg64 {
   }
 
  private:
+  /// An unsigned integer of 128 bits, which not every compiler has.
   struct Wide {
     std::uint64_t high = 0, low = 0;
   };
@@ -116,7 +121,7 @@ class Pcg64 {
     return {a.high + b.high + (low < a.low ? 1U : 0U), low};
   }
 
-  /// The product of two numbers of 64 bits, in 128 bits.
+  /// The product of two numbers of 64 bits, by the halves of their digits as on paper.
   static Wide product(std::uint64_t a, std::uint64_t b) noexcept {
     constexpr std::uint64_t kHalf = 0xffffffff;
     const std::uint64_t a_low = a & kHalf, a_high = a >> 32U, b_low = b & kHalf, b_high = b >> 32U;
@@ -134,7 +139,7 @@ class Pcg64 {
     state_ = sum(next, increment_);
   }
 
-  /// 32 random bits: the lower and then the upper half of 64.
+  /// 32 random bits. Like NumPy, it draws 64 in every other call, and keeps the upper half.
   std::uint32_t half() noexcept {
     if (has_half_) {
       has_half_ = false;

@@ -17,7 +17,7 @@
 namespace sdnn::core {
 
 /// Purpose of a random number. Each purpose has a separate stream, so that drawing more numbers for
-/// one never changes another.
+/// one never changes another. The numbers enter seeds: a changed one would change results.
 enum class Stream : std::uint64_t {
   code_books = 1,
   permutations = 2,
@@ -36,11 +36,10 @@ enum class Stream : std::uint64_t {
 
 /// xoshiro256** (Blackman, Vigna 2018), seeded by SplitMix64 from (seed, stream, index).
 ///
-/// Its results are the same with every standard library, unlike those of std::shuffle and
-/// std::normal_distribution.
+/// Its results do not depend on the library, unlike std::shuffle and std::normal_distribution.
 class Random {
  public:
-  /// The generator number `index` of `stream` under the root `seed`.
+  /// Makes generator number `index` of those that share a seed and a stream.
   Random(std::uint64_t seed, Stream stream, std::uint64_t index = 0) noexcept {
     std::uint64_t mixed = seed;
     mixed = split_mix(mixed) ^ static_cast<std::uint64_t>(stream);
@@ -78,7 +77,7 @@ class Random {
   std::make_unsigned_t<Integer> below(Integer n) noexcept {
     assert(n > 0);
     const auto size = static_cast<std::uint64_t>(n);
-    const std::uint64_t rejected = (0 - size) % size;  // 2^64 mod n
+    const std::uint64_t rejected = (0 - size) % size;  // 2^64 mod n: the rest is a multiple of n
     std::uint64_t drawn = bits();
     while (drawn < rejected) drawn = bits();
     return static_cast<std::make_unsigned_t<Integer>>(drawn % size);
@@ -92,8 +91,7 @@ class Random {
     return normal_quantile((static_cast<double>(bits() >> 12) + 0.5) * 0x1.0p-52);
   }
 
-  /// Puts `items` in a uniformly random order (Fisher-Yates, from the back). The computation may be
-  /// interrupted.
+  /// Puts `items` in a uniformly random order (Fisher-Yates, from the back). Can be interrupted.
   template <class Item>
   void shuffle(std::span<Item> items) {
     constexpr std::size_t kItemsPerPoint = std::size_t{1} << 16;  // between two interruption points

@@ -42,9 +42,8 @@ struct FileContent {
 /// The number of the only supported format.
 inline constexpr int kFileFormat = 1;
 
-/// Parses JSON. Throws std::runtime_error for a text that is not JSON, has a member of the
-/// outermost object twice, or exceeds the size or depth of headers; such a text is refused before
-/// the value is built.
+/// Parses JSON. Throws std::runtime_error, before a value is built, for a text that is not JSON,
+/// has a member of the outermost object twice, or exceeds the size or depth of headers.
 inline nlohmann::json parse_json(std::string_view text) {
   constexpr int kMostLevels = 32;
   constexpr std::size_t kMostValues = 1'000'000;
@@ -68,14 +67,17 @@ inline nlohmann::json parse_json(std::string_view text) {
 
 namespace detail {
 
+/// Limits of files, in bytes. That of headers is the one of the safetensors library; that of files,
+/// 16 GiB or half the address space, is a chosen constant.
 inline constexpr std::uint64_t kLongestHeader = 100'000'000;
-// The limit is 16 GiB, or the address space.
 inline constexpr std::uint64_t kLargestFile =
     std::min<std::uint64_t>(std::uint64_t{1} << 34, std::numeric_limits<std::ptrdiff_t>::max());
 
-// Tensors that a file may have in addition to one for every two bytes of data.
+/// Tensors that a file may have in addition to one for every two bytes of data (chosen). More would
+/// be empty tensors of a damaged header, whose parsing takes memory.
 inline constexpr std::uint64_t kMostEmptyTensors = 1024;
 
+/// Counts how often a word occurs in a text.
 inline std::size_t count_of(std::string_view text, std::string_view word) {
   std::size_t n = 0;
   for (auto at = text.find(word); at != text.npos; at = text.find(word, at + word.size())) ++n;
@@ -89,12 +91,13 @@ struct TensorPlace {
   std::uint64_t begin, end;
 };
 
-inline void expect_of_file(bool holds, const std::string& what) {
-  if (!holds) throw std::runtime_error(what);
+/// Throws std::runtime_error with the `problem` unless `holds`.
+inline void expect_of_file(bool holds, const std::string& problem) {
+  if (!holds) throw std::runtime_error(problem);
 }
 
-/// Reads type, shape and range of bytes of a tensor from its entry in the header, which may be
-/// damaged. Throws std::runtime_error naming the problem.
+/// Reads type, shape and bytes of a tensor from its entry, maybe damaged, in the header of a file
+/// with `n_bytes` of tensors. Throws std::runtime_error naming tensor and problem.
 inline TensorPlace tensor_place(const std::string& name, const nlohmann::json& entry,
                                 std::uint64_t n_bytes) {
   const auto expect = [&name](bool holds, const char* what) {
@@ -106,10 +109,10 @@ inline TensorPlace tensor_place(const std::string& name, const nlohmann::json& e
   const auto& dtype = entry["dtype"];
   const auto& shape = entry["shape"];
   const auto& offsets = entry["data_offsets"];
-  const auto found = std::ranges::find_if(
+  const auto facts = std::ranges::find_if(
       kTensorTypes, [&dtype](const TensorTypeFacts& known) { return dtype == known.name; });
-  expect(found != kTensorTypes.end(), "has a dtype that is not known");
-  const auto type = static_cast<TensorType>(found - kTensorTypes.begin());
+  expect(facts != kTensorTypes.end(), "has a dtype that is not known");
+  const auto type = static_cast<TensorType>(facts - kTensorTypes.begin());
   const auto is_number = [](const nlohmann::json& value) { return value.is_number_unsigned(); };
   expect(offsets.is_array() && offsets.size() == 2 && std::ranges::all_of(offsets, is_number),
          "has no data_offsets of two numbers");
@@ -118,9 +121,9 @@ inline TensorPlace tensor_place(const std::string& name, const nlohmann::json& e
   expect(shape.is_array() && std::ranges::all_of(shape, is_number), "has no shape of numbers");
   const bool is_empty = std::ranges::any_of(
       shape, [](const auto& n) { return n.template get<std::uint64_t>() == 0; });
-  std::uint64_t size = is_empty ? 0 : found->n_bytes;
-  for (const auto& entry_of_shape : shape) {
-    const auto extent = entry_of_shape.get<std::uint64_t>();
+  std::uint64_t size = is_empty ? 0 : facts->n_bytes;
+  for (const auto& number : shape) {
+    const auto extent = number.get<std::uint64_t>();
     expect(is_empty || size <= n_bytes / extent, "is not as large as its shape");
     expect(std::in_range<std::size_t>(extent), "has a shape beyond the address space");
     if (!is_empty) size *= extent;
@@ -130,14 +133,27 @@ inline TensorPlace tensor_place(const std::string& name, const nlohmann::json& e
   return place;
 }
 
-/// The format of safetensors: 8 bytes with the header's length, a header in JSON, tensors.
+/// Throws std::runtime_error unless tensors, in order, fill the `n_bytes` without gap or overlap.
+inline void expect_contiguous(const std::vector<std::pair<TensorPlace, std::string>>& places,
+                              std::uint64_t n_bytes) {
+  std::uint64_t reached = 0;
+  for (const auto& [place, name] : places) {
+    expect_of_file(place.begin == reached, "tensor " + name + " leaves a gap or overlaps another");
+    reached = place.end;
+  }
+  expect_of_file(reached == n_bytes, "has " + std::to_string(n_bytes - reached) +
+                                         " bytes after its last tensor, or lost one");
+}
+
+/// The content of a safetensors file.
 struct Safetensors {
-  std::string about;  ///< the metadata "sdnn"
+  std::string about;  ///< the text of "sdnn" in the metadata
   State tensors;
 };
 
-/// Parses a file of `size` bytes, of which `read(begin, into)` reads a part. All sizes are checked
-/// before any allocation. Source: https://huggingface.co/docs/safetensors, "Format".
+/// Parses a file of `size` bytes, of which `read(begin, into)` reads a part: 8 bytes with the
+/// length of the header, the header in JSON, the bytes of all tensors. All sizes are checked before
+/// any allocation. Source: https://huggingface.co/docs/safetensors, "Format".
 template <class Read>
 Safetensors parse_safetensors(std::uint64_t size, const Read& read) {
   std::uint64_t header_size = 0;
@@ -169,13 +185,7 @@ Safetensors parse_safetensors(std::uint64_t size, const Read& read) {
   }
   std::ranges::sort(places, {},
                     [](const auto& item) { return std::pair(item.first.begin, item.first.end); });
-  std::uint64_t reached = 0;
-  for (const auto& [place, name] : places) {
-    expect_of_file(place.begin == reached, "tensor " + name + " leaves a gap or overlaps another");
-    reached = place.end;
-  }
-  expect_of_file(reached == n_bytes, "has " + std::to_string(n_bytes - reached) +
-                                         " bytes after its last tensor, or lost one");
+  expect_contiguous(places, n_bytes);
   for (auto& [place, name] : places) {
     Tensor tensor{place.type, std::move(place.shape), {}};
     tensor.bytes.resize(static_cast<std::size_t>(place.end - place.begin));
@@ -185,7 +195,8 @@ Safetensors parse_safetensors(std::uint64_t size, const Read& read) {
   return content;
 }
 
-/// Place of the checksum: a file begins with the header's length, this, and 8 digits.
+/// The beginning of the header of every file of sdnn; the 8 hexadecimal digits of the checksum
+/// follow, so that they are at the same place in all files.
 inline constexpr std::string_view kBeginning = R"({"__metadata__":{"sdnn":"{\"checksum\":\")";
 inline constexpr std::size_t kChecksumBegin = sizeof(std::uint64_t) + kBeginning.size();
 inline constexpr std::size_t kChecksumEnd = kChecksumBegin + 8;
@@ -196,7 +207,30 @@ inline std::string digits_of(std::uint32_t crc) {
   return digits;
 }
 
-/// The checksum of all bytes of a file of `size` bytes except its own.
+/// Returns the header of a file whose tensors are written in this order, with a checksum of zeros.
+/// Throws nlohmann::json::exception if a text is not UTF-8.
+inline std::string header_of(const FileContent& content,
+                             const std::vector<const State::value_type*>& order) {
+  const nlohmann::json about = {{"checksum", "00000000"},
+                                {"description", content.description},
+                                {"format", kFileFormat},
+                                {"kind", content.kind},
+                                {"version", kVersion}};
+  nlohmann::ordered_json header;
+  header["__metadata__"]["sdnn"] = about.dump(-1, ' ', true);
+  std::uint64_t begin = 0;
+  for (const State::value_type* named : order) {
+    const auto& [name, tensor] = *named;
+    const std::uint64_t end = begin + tensor.bytes.size();
+    header[name]["dtype"] = facts_of(tensor.type).name;
+    header[name]["shape"] = tensor.shape;
+    header[name]["data_offsets"] = {begin, end};
+    begin = end;
+  }
+  return header.dump();
+}
+
+/// Returns the checksum of all bytes of a file except the digits of its checksum.
 template <class Read>
 std::string checksum_of(std::uint64_t size, const Read& read) {
   std::vector<std::byte> buffer(std::size_t{1} << 16);
@@ -215,7 +249,7 @@ std::string checksum_of(std::uint64_t size, const Read& read) {
   return digits_of(crc);
 }
 
-/// Reads a file, whose checksum is compared first. Throws std::runtime_error if it is not whole.
+/// Compares the checksum of a file, then parses it. Throws std::runtime_error naming the problem.
 inline Safetensors read_checked(const std::filesystem::path& path) {
   RegularFile file(path);
   const auto read = [&file](std::uint64_t begin, std::span<std::byte> into) {
@@ -236,8 +270,7 @@ inline Safetensors read_checked(const std::filesystem::path& path) {
 
 }  // namespace detail
 
-/// Reads a file of one of several kinds. Its checksum is compared before anything else is used.
-/// Throws std::runtime_error naming the file and the problem.
+/// Reads a file of one of the `kinds`. Throws std::runtime_error naming the file and the problem.
 inline FileContent read_file(const std::filesystem::path& path,
                              std::initializer_list<std::string_view> kinds) {
   try {
@@ -264,34 +297,17 @@ inline FileContent read_file(const std::filesystem::path& path,
 }
 
 /// Writes a file whole or not at all, with the same bytes as in Python, except for rare numbers
-/// with several shortest texts. Throws std::runtime_error naming the file; an earlier file then
-/// stays.
+/// with several shortest texts. Throws std::runtime_error naming the file; an earlier one stays.
 inline void write_file(const std::filesystem::path& path, const FileContent& content) {
   std::vector<const State::value_type*> order;
   for (const auto& named : content.tensors) order.push_back(&named);
   std::ranges::stable_sort(order, {}, [](const State::value_type* named) {
     return facts_of(named->second.type).storage_rank;  // aligns numbers; ties are ordered by name
   });
-  const nlohmann::json about = {{"checksum", "00000000"},  // replaced below
-                                {"description", content.description},
-                                {"format", kFileFormat},
-                                {"kind", content.kind},
-                                {"version", kVersion}};
-  nlohmann::ordered_json header;
   std::string text;
   try {
-    header["__metadata__"]["sdnn"] = about.dump(-1, ' ', true);
-    std::uint64_t begin = 0;
-    for (const State::value_type* named : order) {
-      const auto& [name, tensor] = *named;
-      const std::uint64_t end = begin + tensor.bytes.size();
-      header[name]["dtype"] = facts_of(tensor.type).name;
-      header[name]["shape"] = tensor.shape;
-      header[name]["data_offsets"] = {begin, end};
-      begin = end;
-    }
-    text = header.dump();
-  } catch (const nlohmann::json::exception& error) {  // the text is not UTF-8
+    text = detail::header_of(content, order);
+  } catch (const nlohmann::json::exception& error) {
     throw std::runtime_error(path.string() + ": cannot be written: " + error.what());
   }
   text.append((8 - text.size() % 8) % 8, ' ');  // so that tensors begin at multiples of 8 bytes

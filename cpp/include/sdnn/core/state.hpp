@@ -49,7 +49,7 @@ struct TensorTypeFacts {
   std::size_t n_bytes;
   int storage_rank;
 };
-/// The facts of all types, in their order.
+/// The facts of each TensorType, by its number.
 inline constexpr std::array<TensorTypeFacts, 8> kTensorTypes{{{"I8", "<i1", 1, 6},
                                                               {"U8", "<u1", 1, 7},
                                                               {"I16", "<i2", 2, 5},
@@ -63,12 +63,13 @@ constexpr const TensorTypeFacts& facts_of(TensorType type) noexcept {
   return kTensorTypes[static_cast<std::size_t>(type)];
 }
 
-/// Numbers of one type in a shape, row by row, in the byte order of memory.
+/// An array of numbers of one type, row by row, in the byte order of memory.
 struct Tensor {
   TensorType type = TensorType::f64;
   std::vector<std::size_t> shape;
   std::vector<std::byte> bytes;
 
+  /// The number of numbers.
   std::size_t size() const noexcept { return bytes.size() / facts_of(type).n_bytes; }
   bool operator==(const Tensor&) const = default;
 };
@@ -78,10 +79,12 @@ using State = std::map<std::string, Tensor, std::less<>>;
 
 namespace detail {
 
-/// The nested parts of an object, whose names have prefixes.
+/// Base of StateWriter and StateReader: tensors of a part have its name as a prefix, as in
+/// "network.weights".
 template <class Archive>
 class Nested {
  public:
+  /// Lists the members of a part, by its `serialize`.
   template <class Part>
   void part(std::string_view name, Part& part) {
     within(name, [&] { std::remove_const_t<Part>::serialize(part, static_cast<Archive&>(*this)); });
@@ -97,7 +100,7 @@ class Nested {
 
  private:
   struct Prefixed {
-    Prefixed(std::string& own, std::string_view name) : prefix(own), before(own) {
+    Prefixed(std::string& extended, std::string_view name) : prefix(extended), before(extended) {
       prefix.append(name).append(".");
     }
     Prefixed(const Prefixed&) = delete;
@@ -137,6 +140,11 @@ class StateWriter : public detail::Nested<StateWriter> {
   void number(std::string_view name, const std::optional<T>& value) {
     if (value) number(name, *value);
   }
+  /// Adds a number, or no tensor if it is the `usual` one.
+  template <class T>
+  void number_unless(std::string_view name, const T& value, std::type_identity_t<T> usual) {
+    if (value != usual) number(name, value);
+  }
   /// Adds an array of any length. Shape: (n,).
   template <class T>
   void numbers(std::string_view name, const std::vector<T>& values) {
@@ -171,8 +179,9 @@ class StateWriter : public detail::Nested<StateWriter> {
   }
 };
 
-/// Restores a state. Every member throws std::invalid_argument naming a tensor that is missing or
-/// does not fit; read into a copy, and move it after success.
+/// Restores a state: each function sets what the function of the same name of StateWriter has
+/// added. It throws std::invalid_argument naming a tensor that is missing or does not fit. The
+/// members read so far have changed then, so read into a copy, as `restore` does.
 class StateReader : public detail::Nested<StateReader> {
  public:
   static constexpr bool kReads = true;
@@ -194,6 +203,11 @@ class StateReader : public detail::Nested<StateReader> {
   void number(std::string_view name, std::optional<T>& value) {
     value.reset();
     if (state_.contains(prefix + std::string(name))) number(name, value.emplace());
+  }
+  template <class T>
+  void number_unless(std::string_view name, T& value, std::type_identity_t<T> usual) {
+    value = usual;
+    if (state_.contains(prefix + std::string(name))) number(name, value);
   }
   template <class T>
   void numbers(std::string_view name, std::vector<T>& values) {
@@ -218,44 +232,42 @@ class StateReader : public detail::Nested<StateReader> {
     expect(std::ranges::all_of(values, [](double x) { return std::isfinite(x); }), name, "finite");
   }
 
-  /// Number of parts called `name`.1, `name`.2 and so on.
+  /// Counts the parts called `name`.1, `name`.2 and so on.
   std::size_t n_numbered(std::string_view name) const {
     std::size_t n = 0;
     for (;; ++n) {
       const std::string beginning = prefix + std::string(name) + "." + std::to_string(n + 1) + ".";
-      const auto found = state_.lower_bound(beginning);
-      if (found == state_.end() || !found->first.starts_with(beginning)) return n;
+      const auto tensor = state_.lower_bound(beginning);
+      if (tensor == state_.end() || !tensor->first.starts_with(beginning)) return n;
     }
   }
 
-  /// Throws unless there is a tensor with this number of items, before memory for them is
-  /// allocated.
+  /// Throws unless the tensor has `size` numbers. Callers compute the size from settings, before
+  /// they allocate memory for these; it is a double, because the product may exceed integers.
   void expect_size(std::string_view name, double size) const {
-    const auto found = state_.find(prefix + std::string(name));
-    expect(found != state_.end(), name, "there");
-    expect(static_cast<double>(found->second.size()) == size, name,
+    expect(static_cast<double>(tensor_called(name).size()) == size, name,
            "as large as the approximator's");
   }
 
-  /// Throws unless `holds`, naming the tensor and the requirement.
-  void expect(bool holds, std::string_view name, std::string_view what) const {
+  /// Throws "state: <prefix><name> must be <expected>" unless `holds`.
+  void expect(bool holds, std::string_view name, std::string_view expected) const {
     if (holds) return;
     fail(std::invalid_argument("state: " + prefix + std::string(name) + " must be " +
-                               std::string(what)));
+                               std::string(expected)));
   }
 
-  /// Calls a function that reads a tensor, and names the tensor in its std::invalid_argument.
-  template <class Take>
-  void taking(std::string_view name, const Take& take) const {
+  /// Calls `use()`, and adds the tensor's name to the message of its std::invalid_argument.
+  template <class Use>
+  void naming(std::string_view name, const Use& use) const {
 #if SDNN_EXCEPTIONS
     try {
-      take();
+      use();
     } catch (const std::invalid_argument& error) {
       expect(false, name, std::string("such that ") + error.what());
     }
 #else
     static_cast<void>(name);
-    take();
+    use();
 #endif
   }
 
@@ -268,11 +280,15 @@ class StateReader : public detail::Nested<StateReader> {
   }
 
  private:
+  const Tensor& tensor_called(std::string_view name) const {
+    const auto item = state_.find(prefix + std::string(name));
+    expect(item != state_.end(), name, "there");
+    return item->second;
+  }
+  /// Returns a tensor of numbers of type T, whose bytes fit its shape, and notes that it was read.
   template <class T>
   const Tensor& find(std::string_view name) {
-    const auto found = state_.find(prefix + std::string(name));
-    expect(found != state_.end(), name, "there");
-    const Tensor& tensor = found->second;
+    const Tensor& tensor = tensor_called(name);
     expect(tensor.type == tensor_type<T>(), name, facts_of(tensor_type<T>()).name);
     std::size_t size = 1;
     for (const std::size_t extent : tensor.shape) {
@@ -300,7 +316,7 @@ class StateReader : public detail::Nested<StateReader> {
   }
 
   const State& state_;
-  std::set<const Tensor*> read_;
+  std::set<const Tensor*> read_;  ///< all that were read
 };
 
 /// The state of an object.

@@ -27,8 +27,7 @@ TEST(Interruption, DoesNothingUntilItIsRequested) {
   EXPECT_THROW(interruption_point(), StopError);
 }
 
-// A check that is slow, such as for signals in Python, may skip points unless it should run at
-// once.
+// A slow check, such as Python's for signals, may skip points unless it should run at once.
 TEST(Interruption, PassesOnWhetherToCheckImmediately) {
   static int n_at_once;
   n_at_once = 0;

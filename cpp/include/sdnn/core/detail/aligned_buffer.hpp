@@ -22,7 +22,7 @@ constexpr std::size_t round_up(std::size_t n, std::size_t multiple) noexcept {
   return (n + multiple - 1) / multiple * multiple;
 }
 
-/// The number of items in a number of rows. Throws std::bad_alloc if a size cannot hold it.
+/// Returns n_rows * n_columns. Throws std::bad_alloc if std::size_t cannot hold the product.
 inline std::size_t checked_product(std::size_t n_rows, std::size_t n_columns) {
   if (n_rows != 0 && n_columns > std::numeric_limits<std::size_t>::max() / n_rows) {
     fail(std::bad_alloc());
@@ -40,16 +40,17 @@ class AlignedBuffer {
 
  public:
   AlignedBuffer() = default;
-  /// Allocates zeros. Throws std::bad_alloc if there is not enough memory.
   explicit AlignedBuffer(std::size_t size) : size_(size) {
     if (size == 0) return;
     constexpr std::size_t kMost = std::numeric_limits<std::size_t>::max() - kCacheLine;
     if (size > kMost / sizeof(Item)) fail(std::bad_alloc());
-    // calloc leaves large blocks untouched; one more cache line makes room to align inside it.
+    // calloc does not touch the pages of large blocks. It may return any address, so the block has
+    // room for an additional cache line, and the items begin at the next boundary in it.
     block_ = std::calloc(size * sizeof(Item) + kCacheLine, 1);
     if (block_ == nullptr) fail(std::bad_alloc());
-    const auto misfit = reinterpret_cast<std::size_t>(block_) % kCacheLine;
-    data_ = reinterpret_cast<Item*>(static_cast<std::byte*>(block_) + (kCacheLine - misfit));
+    const auto beyond_boundary = reinterpret_cast<std::size_t>(block_) % kCacheLine;
+    data_ =
+        reinterpret_cast<Item*>(static_cast<std::byte*>(block_) + (kCacheLine - beyond_boundary));
   }
   AlignedBuffer(const AlignedBuffer& other) : AlignedBuffer(other.size_) {
     std::copy_n(other.data_, size_, data_);
@@ -76,8 +77,8 @@ class AlignedBuffer {
     std::swap(size_, other.size_);
   }
 
-  void* block_ = nullptr;
-  Item* data_ = nullptr;
+  void* block_ = nullptr;  ///< what calloc returned
+  Item* data_ = nullptr;   ///< the first item, inside the block
   std::size_t size_ = 0;
 };
 

@@ -1,5 +1,4 @@
-/// Argument checks for public functions: messages name the argument, the expected and the given
-/// value.
+/// Argument checks: messages name the argument, what was expected, and the value.
 #pragma once
 
 #include <algorithm>
@@ -56,24 +55,29 @@ inline bool are_finite(std::span<const double> values) noexcept {
   return std::ranges::all_of(values, [](double x) { return std::isfinite(x); });
 }
 
-/// Throws std::invalid_argument unless there are as many items, "values", as expected. Only the
-/// text of an error allocates, here and below.
+/// Throws std::invalid_argument unless `size` is `expected`, a number of `items`. Like the checks
+/// below, which every step of an agent calls, it allocates memory for errors only.
 inline void require_size(std::string_view name, std::size_t size, std::size_t expected,
                          const char* items = "values") {
   if (size != expected) require(false, name, std::to_string(expected) + ' ' + items, size);
 }
 
-/// Throws std::invalid_argument unless an index is below a number.
+/// Throws std::invalid_argument unless index < end.
 inline void require_below(std::string_view name, std::size_t index, std::size_t end) {
   if (index >= end) require(false, name, "less than " + std::to_string(end), index);
 }
 
+constexpr bool is_unit_value(double value) noexcept { return value >= 0.0 && value <= 1.0; }
+/// Whether all numbers are in [0, 1].
+inline bool are_unit_values(std::span<const double> values) noexcept {
+  return std::ranges::all_of(values, is_unit_value);
+}
 /// Throws std::invalid_argument unless `values` are `size` numbers in [0, 1].
 inline void require_unit_values(std::string_view name, std::span<const double> values,
                                 std::size_t size) {
   require_size(name, values.size(), size);
   for (std::size_t i = 0; i < size; ++i) {
-    if (values[i] >= 0.0 && values[i] <= 1.0) continue;
+    if (is_unit_value(values[i])) continue;
     require_in_range(std::string(name) + '[' + std::to_string(i) + ']', values[i], 0.0, 1.0);
   }
 }

@@ -16,13 +16,13 @@
 
 namespace sdnn::core::detail {
 
-/// The remainder of a polynomial times x by the generator of CRC-32, 0xedb88320; the lowest power
-/// is in the highest bit.
+/// Multiplies a polynomial over bits by x, and returns the remainder of the division by CRC-32's
+/// generator, 0xedb88320. Coefficients are reversed: bit 31 is that of x^0, bit 0 that of x^31.
 constexpr std::uint32_t crc_times_x(std::uint32_t crc) noexcept {
   return (crc >> 1) ^ ((crc & 1U) != 0 ? 0xedb88320U : 0U);
 }
 
-/// Table k has the remainders of each byte with k zero bytes after it.
+/// kCrcTables[k][b] is the remainder of the byte b followed by k bytes of 0.
 inline constexpr auto kCrcTables = [] {
   std::array<std::array<std::uint32_t, 256>, 16> tables{};
   for (std::uint32_t byte = 0; byte < 256; ++byte) {
@@ -39,7 +39,8 @@ inline constexpr auto kCrcTables = [] {
   return tables;
 }();
 
-/// The remainder `crc` after more bytes, sixteen of them at a time.
+/// Returns the remainder `crc` after further bytes. The remainder of a block of 16 is the sum (XOR)
+/// of those of its bytes, each followed by 0 for the bytes after it.
 inline std::uint32_t crc_by_tables(std::span<const std::byte> bytes, std::uint32_t crc) noexcept {
   static_assert(std::endian::native == std::endian::little,
                 "words are read in the order of the bytes");
@@ -63,7 +64,8 @@ inline std::uint32_t crc_by_tables(std::span<const std::byte> bytes, std::uint32
 
 #define SDNN_TARGET_CLMUL gnu::target("pclmul,sse4.1")
 
-/// x^n, for carry-less products of numbers whose lowest power is in the highest bit.
+/// Returns the remainder of x^n as a factor of carry-less products. It is doubled, because such a
+/// product of two numbers with reversed coefficients has them one bit too low.
 constexpr long long crc_power_of_x(int n) noexcept {
   std::uint32_t crc = 0x80000000U;  // x^0
   for (int i = 0; i < n; ++i) crc = crc_times_x(crc);
@@ -83,8 +85,10 @@ constexpr long long crc_power_of_x(int n) noexcept {
                        next);
 }
 
-/// Returns the CRC of at least 64 bytes, by folding. Source: Gopal, V. et al. (2009). Fast CRC
-/// Computation for Generic Polynomials Using PCLMULQDQ Instruction. Intel.
+/// Returns the remainder `crc` after at least 64 further bytes. Four blocks of 16 bytes are folded,
+/// each into the one 64 bytes later, until the last 64 bytes; then these are folded into 16, whose
+/// remainder tables give. Source: Gopal, V. et al. (2009). Fast CRC Computation for Generic
+/// Polynomials Using PCLMULQDQ Instruction. Intel.
 [[SDNN_TARGET_CLMUL]] inline std::uint32_t crc_by_folding(std::span<const std::byte> bytes,
                                                           std::uint32_t crc) noexcept {
   constexpr long long k544 = crc_power_of_x(512 + 32), k480 = crc_power_of_x(512 - 32);
@@ -110,7 +114,8 @@ constexpr long long crc_power_of_x(int n) noexcept {
 
 #endif
 
-/// The CRC-32 of zlib and gzip, of bytes that follow others whose CRC-32 is `crc`.
+/// Returns the CRC-32 of zlib and gzip, of bytes that follow others whose CRC-32 is `crc`. By its
+/// definition all bits of the remainder are inverted before the first byte and at the end.
 inline std::uint32_t crc32(std::span<const std::byte> bytes, std::uint32_t crc = 0) {
 #if SDNN_X86_KERNELS
   if (bytes.size() >= 64 && instruction_set() >= InstructionSet::avx2 &&

@@ -1,11 +1,13 @@
 /// Number of cells of a grid, and the refusal of tables that are too large.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <iomanip>
 #include <ios>
 #include <limits>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <string_view>
@@ -18,19 +20,19 @@ namespace sdnn::core {
 /// The default of every max_table_bytes: 1 GiB.
 inline constexpr std::uint64_t kDefaultMaxTableBytes = std::uint64_t{1} << 30;
 
-/// Throws SizeError "<sizes> must be smaller: ..."; `sizes` are names: "n_sets or n_inputs".
+/// Throws SizeError about the first of the `sizes`, which is n_sets in "n_sets or n_inputs".
 [[noreturn]] inline void fail_for_size(std::string_view sizes, const std::ostringstream& message) {
   const std::string_view first = sizes.substr(0, sizes.find_first_of(" ,"));
   fail(SizeError(std::string(first), message.str()));
 }
 
-/// A limit in bytes, at most the address space.
-constexpr std::uint64_t addressable(std::uint64_t most) noexcept {
-  constexpr std::uint64_t kAddressable = std::numeric_limits<std::size_t>::max();
-  return most < kAddressable ? most : kAddressable;
+/// Returns a number of bytes, or the size of the address space if that is smaller.
+constexpr std::uint64_t addressable(std::uint64_t n_bytes) noexcept {
+  return std::min<std::uint64_t>(n_bytes, std::numeric_limits<std::size_t>::max());
 }
 
-/// Ends the message with the limit that is exceeded: the address space if `fits_table`.
+/// Completes the message with the limit that is exceeded, and throws it as SizeError. The limit is
+/// the setting max_table_bytes or, if that is high enough (`fits_table`), the address space.
 [[noreturn]] inline void fail_for_limit(std::string_view sizes, std::ostringstream& message,
                                         bool fits_table, std::uint64_t max_table_bytes) {
   if (fits_table) {
@@ -41,26 +43,39 @@ constexpr std::uint64_t addressable(std::uint64_t most) noexcept {
   fail_for_size(sizes, message);
 }
 
-/// Throws SizeError "<sizes> must be smaller: <what> need <bytes> bytes, but max_table_bytes is
-/// ..." for too many bytes. Call it before allocating; `bytes` is a double, which no product
-/// overflows.
-inline void require_table_bytes(std::string_view sizes, std::string_view what, double bytes,
+/// Begins a message: "<sizes> must be smaller: <parts> need <bytes> bytes, but ".
+inline std::ostringstream message_of_bytes(std::string_view sizes, std::string_view parts,
+                                           double bytes) {
+  std::ostringstream message;
+  message << sizes << " must be smaller: " << parts << " need " << std::fixed
+          << std::setprecision(0) << bytes << " bytes, but ";
+  return message;
+}
+
+/// Throws SizeError if `bytes` exceeds the setting max_table_bytes or the address space. Call it
+/// before allocating; `bytes` is a double, because products of settings may exceed integers. The
+/// message names the `sizes` to reduce and the `parts` that need the memory.
+inline void require_table_bytes(std::string_view sizes, std::string_view parts, double bytes,
                                 std::uint64_t max_table_bytes) {
   if (bytes <= static_cast<double>(addressable(max_table_bytes))) return;
-  std::ostringstream message;
-  message << sizes << " must be smaller: " << what << " need " << std::fixed << std::setprecision(0)
-          << bytes << " bytes, but ";
+  std::ostringstream message = message_of_bytes(sizes, parts, bytes);
   fail_for_limit(sizes, message, bytes <= static_cast<double>(max_table_bytes), max_table_bytes);
 }
 
-/// Checks a limit that no setting changes: "... bytes, but at most <most> are allowed".
-inline void require_bytes(std::string_view sizes, std::string_view what, double bytes,
+/// Throws SizeError if `bytes` exceeds the address space or `most`, which no setting changes.
+inline void require_bytes(std::string_view sizes, std::string_view parts, double bytes,
                           std::uint64_t most) {
   if (bytes <= static_cast<double>(addressable(most))) return;
-  std::ostringstream message;
-  message << sizes << " must be smaller: " << what << " need " << std::fixed << std::setprecision(0)
-          << bytes << " bytes, but at most " << addressable(most) << " are allowed";
+  std::ostringstream message = message_of_bytes(sizes, parts, bytes);
+  message << "at most " << addressable(most) << " are allowed";
   fail_for_size(sizes, message);
+}
+
+/// Returns the product, or nothing if it is 2^64 or more, or a factor is missing. Requires b > 0.
+constexpr std::optional<std::uint64_t> exact_product(std::optional<std::uint64_t> a,
+                                                     std::uint64_t b) noexcept {
+  if (!a || *a > std::numeric_limits<std::uint64_t>::max() / b) return std::nullopt;
+  return *a * b;
 }
 
 /// Returns n_per_dimension ^ n_dimensions if a table with `bytes_per_cell` for each cell is
@@ -73,25 +88,20 @@ inline void require_bytes(std::string_view sizes, std::string_view what, double 
 inline std::size_t grid_cells(std::string_view sizes, std::string_view cells,
                               std::size_t n_per_dimension, std::size_t n_dimensions,
                               std::size_t bytes_per_cell, std::uint64_t max_table_bytes) {
-  constexpr auto kMost = std::numeric_limits<std::uint64_t>::max();
-  std::uint64_t n = 1;
-  bool countable = true;
-  for (std::size_t i = 0; i < n_dimensions && countable; ++i) {
-    countable = n <= kMost / n_per_dimension;
-    if (countable) n *= n_per_dimension;
+  std::optional<std::uint64_t> n_cells = 1;
+  for (std::size_t i = 0; i < n_dimensions && n_cells; ++i) {
+    n_cells = exact_product(n_cells, n_per_dimension);
   }
-  const bool sized = countable && n <= kMost / bytes_per_cell;
-  const bool fits_table = sized && n * bytes_per_cell <= max_table_bytes;
-  if (fits_table && n * bytes_per_cell == addressable(n * bytes_per_cell)) {
-    return static_cast<std::size_t>(n);
-  }
+  const std::optional<std::uint64_t> n_bytes = exact_product(n_cells, bytes_per_cell);
+  const bool fits_table = n_bytes && *n_bytes <= max_table_bytes;
+  if (fits_table && *n_bytes == addressable(*n_bytes)) return static_cast<std::size_t>(*n_cells);
 
   std::ostringstream message;
   message << sizes << " must be smaller: a table of " << n_per_dimension << '^' << n_dimensions;
-  if (countable) message << " = " << n;
+  if (n_cells) message << " = " << *n_cells;
   message << ' ' << cells << " needs ";
-  if (sized) {
-    message << n * bytes_per_cell << " bytes";
+  if (n_bytes) {
+    message << *n_bytes << " bytes";
   } else {
     message << "2^64 bytes or more";
   }

@@ -2,22 +2,30 @@
 ///
 /// All code for an instruction set is a kernel. A kernel `name` in a package's namespace has a
 /// version for each level in the nested namespace `detail`: name_portable, name_neon, name_avx2,
-/// name_avx512. It is exact: sums of integers, or floating-point operations in a fixed order, so
-/// that all versions give the same bits. SDNN_KERNEL makes all versions from one body. If some
-/// versions are written by hand, SDNN_KERNEL_PORTABLE, SDNN_KERNEL_NEON, SDNN_KERNEL_AVX2 and
-/// SDNN_KERNEL_AVX512 make the others, and SDNN_DISPATCH makes the function that chooses. A new
-/// level needs an enumerator of core::InstructionSet, a macro like these and a line in
-/// SDNN_DISPATCH.
+/// name_avx512. All versions must give the same bits: a kernel may only add integers, or compute
+/// with floating-point numbers in a fixed order.
+///
+/// SDNN_KERNEL makes all versions from one body:
+///
+///     namespace detail {
+///     SDNN_INLINE int sum_body(const int* items, int n) { ... }
+///     }
+///     SDNN_KERNEL(int, sum, (const int* items, int n), (items, n))  // defines sum(items, n)
+///
+/// If some versions are written by hand, SDNN_KERNEL_PORTABLE, SDNN_KERNEL_NEON, SDNN_KERNEL_AVX2
+/// and SDNN_KERNEL_AVX512 make the others, and SDNN_DISPATCH makes the function that chooses. A new
+/// level needs a value of InstructionSet, such a macro and a line in SDNN_DISPATCH.
 #pragma once
 
 #include "sdnn/core/detail/lanes.hpp"
 #include "sdnn/core/instruction_set.hpp"
 
-// `parameters` and `arguments` are lists in parentheses. The function `name_body` in `detail`, and
-// everything that it calls, must be SDNN_INLINE, so that it is compiled inside each version.
+// The function `name_body`, and everything that it calls, must be SDNN_INLINE: only then it is
+// compiled inside each version, with the instructions of that version.
 
-// A program of several units may compile these versions once, in a unit that defines
-// SDNN_KERNELS_HERE before all includes; all units are compiled with SDNN_KERNELS_ELSEWHERE.
+// Usually every translation unit compiles all versions, as inline functions. A program can compile
+// them once instead: with SDNN_KERNELS_ELSEWHERE defined in all units, they are only declared, but
+// for one unit that also defines SDNN_KERNELS_HERE before its includes.
 #if defined(SDNN_KERNELS_ELSEWHERE) && !defined(SDNN_KERNELS_HERE)
 #define SDNN_KERNEL_VERSION(attributes, Result, version, parameters, body) \
   namespace detail {                                                       \
@@ -38,7 +46,7 @@
 #define SDNN_KERNEL_PORTABLE(Result, name, parameters, arguments) \
   SDNN_KERNEL_VERSION(, Result, name##_portable, parameters, name##_body arguments)
 
-// Builds for NEON may use it everywhere, so their portable version already does.
+// In builds for NEON the compiler uses it in all code, so the version for NEON is the portable one.
 #if SDNN_NEON_KERNELS
 #define SDNN_KERNEL_NEON(Result, name, parameters, arguments) \
   SDNN_KERNEL_VERSION(, Result, name##_neon, parameters, name##_portable arguments)

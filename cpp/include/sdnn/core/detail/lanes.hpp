@@ -15,11 +15,10 @@
 #include "sdnn/core/detail/floating_point.hpp"
 
 #if defined(__clang__) || \
-    (defined(__GNUC__) && __GNUC__ >= 12)  // the first with shuffles as clang's
+    (defined(__GNUC__) && __GNUC__ >= 12)  // the first with __builtin_shufflevector
 #define SDNN_LANES 1
 /// SDNN_INLINE forces inlining. A kernel for an instruction set must inline everything that it
-/// uses: other functions are compiled for the baseline, whose registers are too narrow for wide
-/// lanes.
+/// uses: others are compiled for the baseline, whose registers are too narrow.
 #define SDNN_INLINE __attribute__((always_inline)) inline
 #define SDNN_INLINE_LAMBDA __attribute__((always_inline))
 #else
@@ -41,20 +40,23 @@
 
 namespace sdnn::core {
 
-// For a single number, the mask is a bool and the bits are an integer.
+// The functions below exist for a double and for Lanes, so that a formula compiles for both. The
+// result of a comparison, a mask, is a bool for a double and LaneBits for Lanes.
 
+/// Returns `first` where the mask is set, `second` elsewhere.
 SDNN_INLINE double select(bool mask, double first, double second) noexcept {
   return mask ? first : second;
 }
 /// Whether the mask is set in any lane.
 SDNN_INLINE bool any(bool mask) noexcept { return mask; }
 SDNN_INLINE bool both(bool first, bool second) noexcept { return first && second; }
+/// Whether the first mask is set and the second is not.
 SDNN_INLINE bool first_only(bool first, bool second) noexcept { return first && !second; }
 SDNN_INLINE std::uint64_t bits_of(double value) noexcept {
   return std::bit_cast<std::uint64_t>(value);
 }
 SDNN_INLINE double double_of(std::uint64_t bits) noexcept { return std::bit_cast<double>(bits); }
-/// The smaller of two numbers, the second if neither is.
+/// Returns `first` if it is less than `second`; else `second`, also if a number is NaN.
 SDNN_INLINE double smaller(double first, double second) noexcept {
   return first < second ? first : second;
 }
@@ -63,7 +65,7 @@ SDNN_INLINE double smaller(double first, double second) noexcept {
 
 SDNN_WIDE_VECTORS_BEGIN
 
-/// `Size` unsigned 64-bit integers; as a mask, all ones or all zeros in each.
+/// `Size` unsigned 64-bit integers. In a mask all bits of an integer are set, or none.
 template <std::size_t Size>
 struct LaneBits {
   typedef std::uint64_t Vector __attribute__((vector_size(Size * sizeof(std::uint64_t))));
@@ -162,7 +164,6 @@ SDNN_INLINE Lanes<Size> select(bool mask, const Lanes<Size>& first,
   return mask ? first : second;
 }
 
-/// `first` where the mask is set, `second` elsewhere.
 template <std::size_t Size>
 SDNN_INLINE Lanes<Size> select(const LaneBits<Size>& mask, const Lanes<Size>& first,
                                const Lanes<Size>& second) noexcept {
@@ -177,9 +178,9 @@ SDNN_INLINE Lanes<Size> smaller(const Lanes<Size>& first, const Lanes<Size>& sec
 
 template <std::size_t Size>
 SDNN_INLINE bool any(const LaneBits<Size>& mask) noexcept {
-  std::uint64_t sum = 0;
-  for (std::size_t i = 0; i < Size; ++i) sum |= mask.v[i];
-  return sum != 0;
+  std::uint64_t united = 0;
+  for (std::size_t i = 0; i < Size; ++i) united |= mask.v[i];
+  return united != 0;
 }
 
 template <std::size_t Size>
@@ -217,7 +218,8 @@ SDNN_INLINE void unrolled(const Function& function) noexcept {
 
 SDNN_WIDE_VECTORS_BEGIN
 
-/// A register of the integers that fit into 32 bytes; sums wrap around.
+/// A register of 32 bytes of integers: 32 std::int8_t, 16 std::int16_t or 8 std::int32_t. Sums wrap
+/// around. Functions take kSize integers in memory, at any alignment.
 template <class Integer>
 struct IntegerRegister {
   typedef Integer Vector __attribute__((vector_size(32)));
@@ -238,13 +240,13 @@ struct IntegerRegister {
     std::memcpy(&other, from, sizeof other);
     v = (Vector)((Wrapping)v - other);
   }
-  /// Raises each integer to the size of the one in memory, if that is larger; none of these may be
-  /// the least of its type.
+  /// Replaces each integer by the absolute value of the one in memory, if that is larger. No
+  /// integer in memory may be the least of its type, which has no absolute value.
   SDNN_INLINE void rise_to_size(const Integer* from) noexcept {
     Vector other;
     std::memcpy(&other, from, sizeof other);
-    const Vector negative = (Vector)(other < 0);
-    other = (other ^ negative) - negative;
+    const Vector negative = (Vector)(other < 0);  // -1 where it is true, else 0
+    other = (other ^ negative) - negative;        // -x is ~x + 1, and ~x is x ^ -1
     const Vector larger = (Vector)(other > v);
     v = (other & larger) | (v & ~larger);
   }
@@ -256,10 +258,13 @@ struct IntegerRegister {
       IntegerRegister sum = *this;
       sum.add(to);
       sum.store(to);
-    } else {  // interleaves integers with their signs, because GCC converts vectors slowly
+    } else {
+      // Widens by shuffles, because GCC converts vectors slowly: an integer x and its sign, 0 or
+      // -1, side by side are the bytes of x in twice the width. The first half of the integers
+      // become a register of wider ones, then the second half.
       using Twice = std::conditional_t<sizeof(Integer) == 1, std::int16_t, std::int32_t>;
       using Half = IntegerRegister<Twice>;
-      static_assert(std::endian::native == std::endian::little, "the sign comes second");
+      static_assert(std::endian::native == std::endian::little, "the sign is the upper half");
       const Vector sign = (Vector)(v < 0);
       [&]<std::size_t... Index>(std::index_sequence<Index...>) SDNN_INLINE_LAMBDA {
         Half{(typename Half::Vector)__builtin_shufflevector(v, sign,

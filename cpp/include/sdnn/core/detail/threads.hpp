@@ -1,5 +1,4 @@
-/// Threads and locks, with substitutes for standard libraries without them (WebAssembly,
-/// microcontrollers).
+/// Threads and locks, with substitutes where they are missing (WebAssembly, microcontrollers).
 #pragma once
 
 #include <memory>

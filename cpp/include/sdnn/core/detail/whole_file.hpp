@@ -1,5 +1,4 @@
-/// Files that are written whole or not at all, even if the process is killed, and read only if they
-/// are regular.
+/// Files that are written whole or not at all, even by killed processes, and read if regular.
 #pragma once
 
 #include <cerrno>
@@ -38,19 +37,19 @@ namespace sdnn::core {
 /// the system's error. On POSIX systems content and name are on the disk when `finish` returns.
 class WholeFile {
  public:
-  /// Opens a new temporary file beside `path`; a name in /dev or of an open descriptor is opened
-  /// itself.
+  /// Opens a new temporary file beside `path`, or `path` itself in /dev or of an open descriptor.
   explicit WholeFile(const std::filesystem::path& path)
       : path_(path), partial_(path), is_special_(is_special(path)) {
     if (!is_special_) partial_ += partial_suffix();
 #if SDNN_HAS_POSIX_FILES
     const int how = is_special_ ? O_TRUNC : O_CREAT | O_EXCL | O_NOFOLLOW;
     file_ = ::open(partial_.c_str(), O_WRONLY | O_CLOEXEC | how, 0666);
-    if (file_ < 0) fail("cannot be written");
-    if (!is_special_) (void)::flock(file_, LOCK_EX | LOCK_NB);  // marks the file as in use
+    if (file_ < 0) fail();
+    // Python removes temporary files without a lock: those of killed processes.
+    if (!is_special_) (void)::flock(file_, LOCK_EX | LOCK_NB);
 #else
     file_.open(partial_, std::ios::binary | std::ios::trunc);
-    if (!file_) fail("cannot be written");
+    if (!file_) fail();
 #endif
     is_under_way_ = !is_special_;
   }
@@ -69,23 +68,23 @@ class WholeFile {
       const auto n = ::write(file_, bytes.data(), bytes.size());
       if (n < 0) {
         if (errno == EINTR) continue;
-        fail("cannot be written");
+        fail();
       }
       bytes = bytes.subspan(static_cast<std::size_t>(n));
     }
 #else
     file_.write(reinterpret_cast<const char*>(bytes.data()),
                 static_cast<std::streamsize>(bytes.size()));
-    if (!file_) fail("cannot be written");
+    if (!file_) fail();
 #endif
   }
 
   /// Completes the file: its data reach the disk before it takes the place of an older one.
   void finish() {
 #if SDNN_HAS_POSIX_FILES
-    if (!is_special_ && ::fsync(file_) != 0) fail("cannot be written");
-    if (!is_special_) rename();  // still locked
-    if (!close()) fail("cannot be written");
+    if (!is_special_ && ::fsync(file_) != 0) fail();
+    if (!is_special_) rename();  // while it is locked, so that nobody removes it before
+    if (!close()) fail();
     if (is_special_) return;
     const std::filesystem::path folder = path_.has_parent_path() ? path_.parent_path() : ".";
     const int descriptor = ::open(folder.c_str(), O_RDONLY | O_CLOEXEC);
@@ -94,7 +93,7 @@ class WholeFile {
     (void)::close(descriptor);
 #else
     file_.flush();
-    if (!file_ || !close()) fail("cannot be written");
+    if (!file_ || !close()) fail();
     if (!is_special_) rename();
 #endif
   }
@@ -107,8 +106,7 @@ class WholeFile {
     return folder == "/dev" || folder == "/dev/fd" || folder == "/proc/self/fd";
   }
 
-  /// Returns a random suffix, so that writers have different temporary files, whose names nobody
-  /// can predict.
+  /// Returns a random suffix: writers have different temporary files, of unpredictable names.
   static std::string partial_suffix() {
     std::random_device random;
     std::string suffix = ".";
@@ -122,14 +120,15 @@ class WholeFile {
     std::filesystem::rename(partial_, path_, error);
     if (error) {
       errno = error.value();
-      fail("cannot be written");
+      fail();
     }
     is_under_way_ = false;
   }
 
-  [[noreturn]] void fail(const char* what) const {
-    core::fail(std::runtime_error(path_.string() + ": " + what + ": " +
-                                  std::generic_category().message(errno)));
+  /// Throws an error that names the file and the system's error number, errno.
+  [[noreturn]] void fail() const {
+    core::fail(std::runtime_error(
+        path_.string() + ": cannot be written: " + std::generic_category().message(errno)));
   }
 
   /// Closes the file; returns whether all data could be written.
@@ -145,9 +144,9 @@ class WholeFile {
   }
 
   std::filesystem::path path_;
-  std::filesystem::path partial_;
-  bool is_special_;
-  bool is_under_way_ = false;
+  std::filesystem::path partial_;  ///< the name while the file is written
+  bool is_special_;                ///< whether it is a device, which is written to directly
+  bool is_under_way_ = false;      ///< whether the destructor has a temporary file to remove
 #if SDNN_HAS_POSIX_FILES
   int file_ = -1;
 #else
@@ -155,14 +154,13 @@ class WholeFile {
 #endif
 };
 
-/// A regular file, open for reading. Folders, devices and pipes are refused, without waiting for
-/// the writer of a pipe. Throws std::runtime_error that names the problem, but not the file.
+/// A regular file, open for reading. Folders, devices and pipes are refused at once. Every function
+/// throws std::runtime_error naming the problem, but not the file.
 class RegularFile {
  public:
-  /// Opens a file to read. Throws std::runtime_error unless it is a regular one, for which no read
-  /// waits.
   explicit RegularFile(const std::filesystem::path& path) {
 #if SDNN_HAS_POSIX_FILES
+    // O_NONBLOCK: the file may be a pipe, whose opening would wait for a writer.
     file_ = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
     if (file_ < 0) refuse(std::generic_category().message(errno));
     struct stat status{};
@@ -187,7 +185,7 @@ class RegularFile {
 
   std::uint64_t size() const noexcept { return size_; }
 
-  /// Fills `into` with the bytes from `begin` on.
+  /// Fills `into` with the bytes from number `begin` on.
   void read(std::uint64_t begin, std::span<std::byte> into) {
 #if SDNN_HAS_POSIX_FILES
     while (!into.empty()) {

@@ -12,14 +12,15 @@ namespace sdnn::core {
 /// A pool of `n_threads` threads, including the caller's, that run one function at a time. Without
 /// threads in the standard library, the caller runs everything.
 ///
-/// Starting a thread costs more than a block of training; waking a waiting thread does not. A pool
-/// must not be used from several threads at once.
+/// The threads wait between calls, because starting a thread takes longer than many of the pieces
+/// of work. A pool must not be used from several threads at once.
 class WorkerTeam {
  public:
   /// Starts the threads, except for the caller's, which works as number 0.
   explicit WorkerTeam(std::size_t n_threads) {
 #if SDNN_HAS_THREADS
-    struct EndsWaiting {  // ends the waiting threads if no further thread can be started
+    // Ends the waiting threads if starting a further one throws; they could not be joined else.
+    struct EndsWaiting {
       WorkerTeam& team;
       bool has_all = false;
       ~EndsWaiting() {
@@ -44,13 +45,14 @@ class WorkerTeam {
 
   std::size_t size() const noexcept { return n_others_ + 1; }
 
-  /// Calls work(thread) for thread = 0 .. size() - 1, each in a different thread, and waits for
-  /// all. `work` must not throw.
+  /// Calls work(i) for i = 0 .. size() - 1, each in another thread, and waits. It must not throw.
   template <class Work>
   void run(const Work& work) {
     if (n_others_ == 0) return work(std::size_t{0});
     work_ = &work;
-    call_ = [](const void* what, std::size_t thread) { (*static_cast<const Work*>(what))(thread); };
+    call_ = [](const void* function, std::size_t thread) {
+      (*static_cast<const Work*>(function))(thread);
+    };
     n_busy_.store(n_others_, std::memory_order_relaxed);
     start();
     work(std::size_t{0});
@@ -69,27 +71,28 @@ class WorkerTeam {
   }
 
  private:
+  /// Starts a round: lets all threads do their parts of the work.
   void start() {
     round_.fetch_add(1, std::memory_order_release);
     round_.notify_all();
   }
 
-  /// Waits for each round of work and does its own part, until there is no work.
+  /// The loop of a thread: does its part of each round, until one without work ends the team.
   void serve(std::size_t thread) {
-    for (std::uint64_t seen = 0;;) {
-      round_.wait(seen, std::memory_order_acquire);
-      ++seen;
+    for (std::uint64_t n_rounds = 0;;) {
+      round_.wait(n_rounds, std::memory_order_acquire);
+      ++n_rounds;
       if (work_ == nullptr) return;
       call_(work_, thread);
       if (n_busy_.fetch_sub(1) == 1) n_busy_.notify_one();
     }
   }
 
-  const void* work_ = nullptr;
-  void (*call_)(const void*, std::size_t) = nullptr;
-  std::atomic<std::uint64_t> round_{0};
-  std::atomic<std::size_t> n_busy_{0};
-  std::size_t n_others_ = 0;
+  const void* work_ = nullptr;  ///< the function of the round; null: the team ends
+  void (*call_)(const void*, std::size_t) = nullptr;  ///< calls the function with a thread's number
+  std::atomic<std::uint64_t> round_{0};               ///< the number of rounds so far
+  std::atomic<std::size_t> n_busy_{0};                ///< threads that have not finished the round
+  std::size_t n_others_ = 0;                          ///< threads beside the caller's
 #if SDNN_HAS_THREADS
   Threads threads_;  // declared last, so that threads are joined before other members are destroyed
 #endif
