@@ -231,8 +231,7 @@ TEST(Controller, WithSeveralEnvironmentsActsAndLearnsLikeItsAgent) {
 }
 
 // Five actions from 0 to 2 are rounded to 0, 1, 1, 2, 2. An action of 1 that the controller has
-// taken as index 1 is learned as such; otherwise it is learned as index 2, whose value is 1
-// exactly.
+// taken as index 1 is learned as such; otherwise as index 2, whose value is exactly 1.
 TEST(Controller, LearnsTheIndexThatWasTakenOfEqualRoundedActions) {
   for (const bool is_removed : {false, true}) {  // removing the environment forgets its action
     auto config =
@@ -258,8 +257,7 @@ TEST(Controller, LearnsTheIndexThatWasTakenOfEqualRoundedActions) {
   }
 }
 
-// Observations have 4 variables, actions one or two numbers in [-2, 2], and rewards are up to
-// 1e300.
+// Observations have 4 variables, actions 1 or 2 numbers in [-2, 2]; rewards are up to 1e300.
 TEST(Controller, RefusesBadArgumentsAndChangesNothing) {
   const Numbers good(4, 0.5), shorter(3, 0.5), nan = {0.5, 0.5, testing::kNaN, 0.5};
   for (ControllerConfig config :

@@ -63,7 +63,7 @@ TEST(Episodes, RefuseBadNumbersOfEnvironments) {
   const auto make = [] { return Episode{}; };
   EXPECT_EQ(testing::message_of([&] { (void)episodes.of(1); }),
             "environment must be less than 1, got 1");
-  for (const std::size_t bad : {std::size_t{0}, Episodes<Episode>::kMost + 1}) {
+  for (const std::size_t bad : {std::size_t{0}, kMostEnvironments + 1}) {
     EXPECT_THROW(episodes.resize(bad, make), std::invalid_argument);
   }
   EXPECT_EQ(episodes.size(), 1U);

@@ -12,26 +12,26 @@
 namespace sdnn::agents {
 namespace {
 
-using Row = std::vector<double>;
+using Row = std::vector<float>;
 
 /// How often the first step takes each action, in `n` selections.
 std::vector<int> counts_of(EpsilonGreedy policy, const Row& values, int n) {
   std::vector<int> counts(values.size());
-  for (int i = 0; i < n; ++i) ++counts[policy.select(values, 0, /*explore=*/true)];
+  for (int i = 0; i < n; ++i) ++counts[policy.select(values, 0)];
   return counts;
 }
 
 std::size_t best_by(TieRule rule, const Row& values) {
-  return EpsilonGreedy({.tie_rule = rule}, 1).select(values, 0, /*explore=*/true);
+  return EpsilonGreedy({.tie_rule = rule}, 1).select(values, 0);
 }
 
 TEST(BestValue, IsTheLargestAtAnyIndex) {
   for (std::size_t size = 1; size < 70; ++size) {
     for (std::size_t at = 0; at < size; ++at) {
-      Row values(size, -3.0);
+      std::vector<double> values(size, -3.0);
       values[at] = -1.5;
       EXPECT_EQ(best_value(std::span<const double>(values)), -1.5) << size << " " << at;
-      std::vector<float> floats(values.begin(), values.end());
+      Row floats(values.begin(), values.end());
       EXPECT_EQ(best_value(std::span<const float>(floats)), -1.5F) << size << " " << at;
     }
   }
@@ -39,8 +39,9 @@ TEST(BestValue, IsTheLargestAtAnyIndex) {
 
 TEST(BestValue, MayBeInfinite) {
   using testing::kInfinity;
-  EXPECT_EQ(best_value(std::span<const double>(Row{0.0, kInfinity, -kInfinity})), kInfinity);
-  EXPECT_EQ(best_value(std::span<const double>(Row(9, -kInfinity))), -kInfinity);
+  EXPECT_EQ(best_value(std::span<const double>(std::vector{0.0, kInfinity, -kInfinity})),
+            kInfinity);
+  EXPECT_EQ(best_value(std::span<const double>(std::vector(9, -kInfinity))), -kInfinity);
 }
 
 TEST(EpsilonGreedy, EveryTieRuleTakesASingleBestAction) {
@@ -59,15 +60,14 @@ TEST(EpsilonGreedy, MiddleTakesTheMiddleOfTheFirstLongestRunOfTies) {
   EXPECT_EQ(best_by(TieRule::middle, {0, 1, 1, 0, 1, 1, 1, 0}), 5U);
   EXPECT_EQ(best_by(TieRule::middle, {1, 1, 0, 1, 1}), 0U);  // even: rounded down; the first run
   EXPECT_EQ(best_by(TieRule::middle, {0, 1, 1, 1, 1}), 2U);
-  EXPECT_EQ(best_by(TieRule::middle, Row(601, 0.0)), 300U);  // a new network: no torque
+  EXPECT_EQ(best_by(TieRule::middle, Row(601)), 300U);  // a new network: no torque
   EXPECT_EQ(best_by(TieRule::middle, {1, 0, 1, 0, 2}), 4U);
 }
 
 TEST(EpsilonGreedy, ValuesWithinTheToleranceOfTheBestAreTies) {
   const Row values = {0.0, 0.75, 0.75, 0.5, 0.0, 1.0, 0.0};
   const auto selected = [&](TieRule rule, double tolerance) {
-    return EpsilonGreedy({.tie_rule = rule, .tie_tolerance = tolerance}, 1)
-        .select(values, 0, /*explore=*/true);
+    return EpsilonGreedy({.tie_rule = rule, .tie_tolerance = tolerance}, 1).select(values, 0);
   };
   EXPECT_EQ(selected(TieRule::middle, 0.0), 5U);   // the best one alone
   EXPECT_EQ(selected(TieRule::middle, 0.25), 1U);  // the longest run of ties: 1 and 2
@@ -93,32 +93,15 @@ TEST(EpsilonGreedy, UniformTakesEveryTiedActionEquallyOften) {
     EXPECT_NEAR(counts[action], 0.25 * n, 5 * sigma);
 }
 
-// The rules of fuzzy Q-learning keep floats: the same picks and the same draws as from doubles.
-TEST(EpsilonGreedy, SelectsFromFloatsLikeFromDoubles) {
-  for (const TieRule rule : {TieRule::uniform, TieRule::lowest, TieRule::middle}) {
-    const EpsilonGreedyConfig config{.epsilon = 0.3, .n_greedy_steps = 2, .tie_rule = rule};
-    EpsilonGreedy of_doubles(config, 4), of_floats(config, 4);
-    core::Random random(4, core::Stream::weights);
-    for (int i = 0; i < 1000; ++i) {
-      std::vector<float> floats(21);
-      for (float& value : floats) value = 0.1F * static_cast<float>(random.below(6));
-      const Row doubles(floats.begin(), floats.end());
-      const bool explore = i % 5 != 0;
-      ASSERT_EQ(of_floats.select(floats, i % 7, explore),
-                of_doubles.select(doubles, i % 7, explore));
-    }
-  }
-}
-
 TEST(EpsilonGreedy, FirstStepsAreGreedyAndLaterOnesRandomWithProbabilityEpsilon) {
   EpsilonGreedy policy({}, 2);  // epsilon 0.1 after 10 steps
-  Row values(50, 0.0);
-  values[7] = 1.0;
+  Row values(50);
+  values[7] = 1.0F;
   int others_early = 0, others_late = 0;
   const int n = 20000;
   for (int i = 0; i < n; ++i) {
-    others_early += policy.select(values, i % 10, /*explore=*/true) != 7;
-    others_late += policy.select(values, 10 + i % 40, /*explore=*/true) != 7;
+    others_early += policy.select(values, i % 10) != 7;
+    others_late += policy.select(values, 10 + i % 40) != 7;
   }
   EXPECT_EQ(others_early, 0);
   const double p = 0.1 * 49 / 50;  // one of 50 random actions is the best one
@@ -132,29 +115,23 @@ TEST(EpsilonGreedy, RandomActionsAreUniformOverAllActions) {
     EXPECT_NEAR(count, 0.2 * n, 5 * std::sqrt(n * 0.2 * 0.8));
 }
 
-TEST(EpsilonGreedy, WithoutExplorationEveryStepIsGreedy) {
-  EpsilonGreedy policy({.epsilon = 1.0, .n_greedy_steps = 0}, 4);
-  for (int step = 0; step < 100; ++step)
-    EXPECT_EQ(policy.select(Row{0, 1, 0}, step, /*explore=*/false), 1U);
-}
-
 TEST(EpsilonGreedy, EvaluationDoesNotChangeTheActionsOfLearning) {
   EpsilonGreedy alone({.n_greedy_steps = 5}, 8), evaluated = alone;
-  const Row tied(30, 0.0);
+  const Row tied(30);
   for (int i = 0; i < 500; ++i) {
-    for (int j = 0; j < i % 4; ++j) (void)evaluated.select(tied, i % 20, /*explore=*/false);
-    EXPECT_EQ(alone.select(tied, i % 20, true), evaluated.select(tied, i % 20, true)) << i;
+    for (int j = 0; j < i % 4; ++j) (void)evaluated.best_action(tied, evaluated.ties(false));
+    EXPECT_EQ(alone.select(tied, i % 20), evaluated.select(tied, i % 20)) << i;
   }
 }
 
 TEST(EpsilonGreedy, EqualSeedsGiveEqualActionsAndOtherSeedsDifferentOnes) {
   EpsilonGreedy first({}, 1), same({}, 1), other_seed({}, 2);
-  const Row tied(601, 0.0);
+  const Row tied(601);
   int differ = 0;
   for (int i = 0; i < 100; ++i) {
-    const std::size_t action = first.select(tied, i, /*explore=*/true);
-    EXPECT_EQ(action, same.select(tied, i, /*explore=*/true));
-    differ += action != other_seed.select(tied, i, /*explore=*/true);
+    const std::size_t action = first.select(tied, i);
+    EXPECT_EQ(action, same.select(tied, i));
+    differ += action != other_seed.select(tied, i);
   }
   EXPECT_GT(differ, 90);  // two of 601 random actions are rarely equal
 }
@@ -163,10 +140,10 @@ TEST(EpsilonGreedy, EqualSeedsGiveEqualActionsAndOtherSeedsDifferentOnes) {
 TEST(EpsilonGreedy, AnActionWithNaNIsNeverTaken) {
   for (const TieRule rule : {TieRule::uniform, TieRule::lowest, TieRule::middle}) {
     EXPECT_THROW(best_by(rule, {}), std::invalid_argument);
-    EXPECT_THROW(best_by(rule, Row(2, std::nan(""))), std::invalid_argument);
+    EXPECT_THROW(best_by(rule, Row(2, std::nanf(""))), std::invalid_argument);
     for (std::size_t at = 0; at < 20; ++at) {
-      Row values(20, 1.0);
-      values[at] = testing::kNaN;
+      Row values(20, 1.0F);
+      values[at] = std::nanf("");
       try {
         EXPECT_NE(best_by(rule, values), at);
       } catch (const std::invalid_argument& error) {

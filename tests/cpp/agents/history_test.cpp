@@ -84,8 +84,7 @@ TEST(History, NoneDoesNotChangeStates) {
   EXPECT_TRUE(memory.empty());
 }
 
-// In the experience a number changes by 0.2, an angle by 0.1 (the shorter way), and a symbol, which
-// has no difference.
+// The experience: a number changes by 0.2, an angle by 0.1 (the shorter way), and a symbol.
 TEST(History, DifferencesOfNumbersAndAnglesAreAppendedAsWorkedByHand) {
   const RandomExperience experience{.n_inputs = 3,
                                     .states = {0.5, 0.95, 0.25},

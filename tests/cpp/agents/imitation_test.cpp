@@ -1,5 +1,3 @@
-#include "sdnn/agents/detail/imitation.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -12,6 +10,7 @@
 #include "sdnn/agents/actor_critic.hpp"
 #include "sdnn/agents/controller.hpp"
 #include "sdnn/agents/detail/make_actor_critic.hpp"
+#include "sdnn/agents/detail/q_lambda_episode.hpp"
 #include "sdnn/agents/q_lambda.hpp"
 #include "sdnn/approximators/detail/state_wiring.hpp"
 #include "sdnn/core/random.hpp"
@@ -156,8 +155,7 @@ TEST(Imitation, RefusesToEndAWarmUpWithoutTransitionsOrTwice) {
   EXPECT_THROW(agent.end_warm_up_of_teacher(), std::invalid_argument);
 }
 
-// Imitation moves the weights of single actions, which an RBF network over states and actions
-// lacks.
+// Imitation moves weights of single actions, which RBF networks of states and actions lack.
 TEST(Imitation, IsRefusedByControllersOfRBFNetworks) {
   ControllerConfig config =
       config_of(approximators::RBFNetworkConfig{.n_bases = 3}, QLearningConfig{});

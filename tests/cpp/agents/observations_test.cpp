@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -12,7 +11,7 @@
 #include <vector>
 
 #include "errors.hpp"
-#include "sdnn/core/pcg64.hpp"
+#include "sdnn/core/random.hpp"
 #include "states.hpp"
 
 namespace sdnn::agents {
@@ -101,8 +100,7 @@ TEST(Observations, RangesMoreThanTwiceTooWideAreNarrowedForUpToFourInputs) {
   EXPECT_EQ(range(-100.0, 100.0, {0.0, 4.0}, 5), std::pair(-100.0, 100.0));
 }
 
-// An angle, its cosine, its sine and the cosine again: variables 1 and 2 are a pair. Without
-// movement no circle can be seen.
+// An angle, its cosine, sine and cosine: variables 1 and 2 are a pair, if they move.
 TEST(Observations, FindPairsOnACircleAsAngles) {
   ObservationConfig config{.low = Ends(4, -10.0), .high = Ends(4, 10.0), .find_angle_pairs = true};
   Numbers observed, motionless;
@@ -141,19 +139,14 @@ TEST(Observations, CodeSymbolsAsOneInputOrAsVariables) {
 
 /// An angle that wanders as its cosine and sine, with noise, and a radius that does or does not.
 Numbers wandering(double noise, double radius_moves) {
-  core::Pcg64 random(std::array<std::uint64_t, 1>{3});
-  const auto normal = [&random] {  // nearly: a sum of 12 uniform numbers has the variance 1
-    double sum = -6.0;
-    for (int i = 0; i < 12; ++i) sum += random.uniform();
-    return sum;
-  };
+  core::Random random(3, core::Stream::sensor_noise);
   Numbers path;
   double angle = 0.0;
   for (int t = 0; t <= 600; ++t) {
-    angle += 0.3 * normal();
+    angle += 0.3 * random.normal();
     const double radius = 1.0 + radius_moves * std::sin(0.05 * t);
-    path.push_back(radius * std::cos(angle) + noise * normal());
-    path.push_back(radius * std::sin(angle) + noise * normal());
+    path.push_back(radius * std::cos(angle) + noise * random.normal());
+    path.push_back(radius * std::sin(angle) + noise * random.normal());
   }
   Numbers observed(path.begin(), path.end() - 2);  // observations, then the next ones
   observed.insert(observed.end(), path.begin() + 2, path.end());

@@ -70,8 +70,7 @@ TEST(QLambda, TargetsOfOneStepAreAsWorkedByHand) {
   EXPECT_NEAR(q(agent, a, 0), 5.0, 0.5);
 }
 
-// With gamma = 1/2 the next value is discounted by 1/4 over two steps, by sqrt(1/2) over half a
-// step.
+// gamma = 1/2: the next value is discounted by 1/4 over two steps, by sqrt(1/2) over half a step.
 TEST(QLambda, DurationsDiscountTargets) {
   const State a{0.1, 0.1}, b{0.9, 0.9};
   for (const auto& [dt, remaining] : {std::pair(2.0, 0.25), std::pair(0.5, std::sqrt(0.5))}) {

@@ -55,8 +55,7 @@ TEST(QLearning, PendingStepsOfRemovedEnvironmentsAreLearned) {
   EXPECT_EQ(agent.network().value(cell(2), 1), 4.0);
 }
 
-// Other environments do nothing here. Weights, random numbers and other tensors without a copy for
-// each environment are shared.
+// Other environments do nothing here. Tensors without a copy for each environment are shared.
 TEST(QLearning, EachOfSeveralEnvironmentsLearnsLikeASingleOne) {
   auto alone = agent_of_two_dimensions();
   testing::RandomTask<decltype(alone)> task(2, 9);

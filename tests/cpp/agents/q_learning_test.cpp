@@ -41,8 +41,7 @@ TEST(QLearning, ATransitionToTheSameStateUsesItsOldValue) {
   EXPECT_DOUBLE_EQ(agent.network().value(cell(3), 0), 0.5 * 4.0 + 0.5 * (2.0 + 0.9 * 4.0));
 }
 
-// Rewards 1, 2, 4, then the goal with 8; the best value in cell 2 is 16. With gamma = 1/2 and
-// alpha = 1 every number is exact.
+// Rewards 1, 2, 4, then 8 at the goal; the best value in cell 2 is 16; gamma = 1/2, alpha = 1.
 TEST(QLearning, NStepReturnsAreLearnedOnceAfterNSteps) {
   LookupTable table = five_cells();
   table.update(cell(2), 1, 16.0);
@@ -85,14 +84,6 @@ TEST(QLearning, PendingStepsAreLearnedBeforeANewEpisodeAndATransitionFromAnother
   }
 }
 
-TEST(QLearning, BadTransitionsAreRefusedBeforeTheyArePending) {
-  Agent agent(five_cells(), {.n_steps = 3}, 1);
-  EXPECT_THROW(agent.learn(Position{1.5}, 0, 1.0, cell(1), false), std::invalid_argument);
-  EXPECT_THROW(agent.learn(cell(0), 0, 1.0, Position{1.5}, false), std::invalid_argument);
-  agent.begin_episode();
-  EXPECT_EQ(agent.network(), five_cells());  // nothing was pending
-}
-
 TEST(QLearning, GreedyFirstStepsAreCountedFromTheBeginningOfAnEpisode) {
   LookupTable table = five_cells(3);
   table.update(cell(0), 2, 1.0);
@@ -106,11 +97,12 @@ TEST(QLearning, GreedyFirstStepsAreCountedFromTheBeginningOfAnEpisode) {
   EXPECT_GT(others, 90);  // two thirds of 200 are expected: 2 of 3 actions are not greedy
 }
 
+// The state includes pending steps of 3-step returns: bad transitions are refused before that.
 TEST(QLearning, RefusesBadTransitionsAndChangesNothing) {
   using Vectors = QLearning<RBFNetwork>;
   Vectors agent(
       {RBFNetwork({.n_inputs = 1, .n_actions = 3}), RBFNetwork({.n_inputs = 1, .n_actions = 2})},
-      {.value_range = ValueRange::adaptive}, 1);
+      {.n_steps = 3, .value_range = ValueRange::adaptive}, 1);
   agent.learn(cell(0), Indices{2, 1}, 1.0, cell(1), false);
   const core::State before = core::state_of(agent);
   for (const Indices& bad : {Indices{}, Indices{1}, Indices(40, 0), Indices{3, 0}, Indices{0, 2}}) {
@@ -175,8 +167,7 @@ TEST(QLearning, ARepeatedActionEndsWithTheEpisodeAndNotWithEvaluations) {
     begun.begin_episode();
     EXPECT_NE(begun.act(cell(0)), action);  // a new random one of 2^17
   }
-  // A random action lasts at least two steps with probability 1/2; five standard deviations of 200
-  // trials are 5 * sqrt(200 / 4) = 35.4.
+  // P(two steps or more) is 1/2; five standard deviations of 200 trials are 5 sqrt(200 / 4) = 35.4.
   EXPECT_NEAR(n_kept, 100, 36);
 }
 

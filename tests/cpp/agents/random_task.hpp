@@ -96,8 +96,7 @@ class RandomTask {
   bool begins_episode_ = true;
 };
 
-/// Expects that the agent allocates nothing when it continues from a restored state, where
-/// acting and learning do not.
+/// Expects that an agent acts and learns after it is restored without allocating memory.
 template <class Make>
 void expect_that_a_restored_agent_allocates_nothing(const Make& make, auto allocation_count) {
   auto agent = make();

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <utility>
+#include <span>
 #include <vector>
 
 #include "sdnn/agents/detail/binary_groups.hpp"
@@ -160,10 +160,7 @@ TEST(Relevance, DoesNotDependOnTheOrderOfInputs) {
     core::Random random(2, core::Stream::useless_inputs);
     std::vector<std::size_t> order(experience.n_inputs);
     for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-    // Not std::shuffle, whose order depends on the standard library.
-    for (std::size_t i = order.size() - 1; i > 0; --i) {
-      std::swap(order[i], order[random.below(i + 1)]);
-    }
+    random.shuffle(std::span(order));
     const std::vector<bool> kept_of_permuted = relevant(permuted(experience, order));
     for (std::size_t i = 0; i < order.size(); ++i) {
       EXPECT_EQ(kept_of_permuted[i], kept[order[i]]) << n_noise << ' ' << i;
@@ -171,8 +168,7 @@ TEST(Relevance, DoesNotDependOnTheOrderOfInputs) {
   }
 }
 
-/// Two one-hot vectors of `n_cells` inputs: a cell on a line that actions move, and a cell that is
-/// drawn at random in each step.
+/// Two one-hot vectors of `n_cells` inputs: a cell that actions move on a line, and a random cell.
 RandomExperience two_walks(std::size_t n, std::size_t n_cells, std::uint64_t seed) {
   core::Random random(seed, core::Stream::useless_inputs);
   RandomExperience experience{.n_inputs = 2 * n_cells, .circular = std::vector<bool>(2 * n_cells)};

@@ -90,14 +90,7 @@ TEST(WarmUp, RemembersDurationsFromTheFirstThatIsNotOneAndRestoresThem) {
   const Numbers state{0.5}, action{1.0}, dts{1.0, 1.0, 2.5, 1.0};
   for (std::size_t t = 0; t < dts.size(); ++t) {
     EXPECT_EQ(core::state_of(warm_up).contains("dts"), t > 2);
-    warm_up.learn({.begins = false,
-                   .environment = 0,
-                   .observation = state,
-                   .action = action,
-                   .reward = 1.0,
-                   .next_observation = state,
-                   .terminated = false,
-                   .dt = dts[t]});
+    warm_up.learn({false, 0, state, action, 1.0, state, false, {}, /*is_own=*/true, dts[t]});
   }
   WarmUp restored = warm_up_of(/*n_variables=*/1, /*n_steps=*/1000);
   core::restore(restored, core::state_of(warm_up));
@@ -133,7 +126,7 @@ TEST(WarmUp, RemembersTransitionsInOrder) {
   EXPECT_EQ(warm_up.step(2).action[0], 4.0);
   EXPECT_EQ(warm_up.step(2).next_observation[1], 2.5);
   // Two variables of the observation and the next one of three transitions.
-  EXPECT_EQ(warm_up.seen().size(), 2U * 2U * 3U);
+  EXPECT_EQ(warm_up.all_observations().size(), 2U * 2U * 3U);
   warm_up.set_n_environments(1);
   EXPECT_EQ(warm_up.n_in_all(), 2U);  // transitions of two environments are remembered
   EXPECT_THROW((void)warm_up.act(draw, always, true, 1), std::invalid_argument);

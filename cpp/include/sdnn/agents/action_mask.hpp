@@ -8,17 +8,18 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/detail/floating_point.hpp"
 
 namespace sdnn::agents {
 
-/// A mask of actions: 1 for each allowed action and 0 for others, dimension by dimension. An empty
-/// mask allows all actions.
+/// A mask of actions, dimension by dimension: 1 if allowed, else 0. An empty mask allows all.
 using ActionMask = std::span<const std::uint8_t>;
 
-/// Removes the next dimension's n entries from the mask of the remaining dimensions; returns them.
+/// Removes the first n entries from the mask of the remaining dimensions, `left`, and returns them:
+/// the mask of the next dimension, which has n actions. An empty mask stays empty.
 inline ActionMask take_part(ActionMask& left, std::size_t n) noexcept {
   if (left.empty()) return {};
   const ActionMask mask = left.first(n);
@@ -26,8 +27,18 @@ inline ActionMask take_part(ActionMask& left, std::size_t n) noexcept {
   return mask;
 }
 
+/// Whether a dimension's mask allows one of its actions.
 inline bool allows(ActionMask mask, std::size_t action) noexcept {
   return mask.empty() || mask[action] != 0;
+}
+/// Whether the mask allows the action: an index in each dimension d, below `n_actions(d)`.
+template <class Action, class NActions>
+bool allows_action(ActionMask mask, const Action& action, const NActions& n_actions) {
+  for (std::size_t d = 0; d < action.size() && !mask.empty(); ++d) {
+    const auto index = static_cast<std::size_t>(action[d]);
+    if (!allows(take_part(mask, n_actions(d)), index)) return false;
+  }
+  return true;
 }
 
 /// Whether a dimension's mask has only zeros and ones, and allows an action.
@@ -36,15 +47,14 @@ inline bool is_mask(ActionMask mask) noexcept {
          std::ranges::find(mask, 1) != mask.end();
 }
 
-/// Returns an allowed one of n actions; draw(k) returns a number below k, the number of allowed
-/// ones.
+/// Returns allowed action number draw(k) of a dimension with n actions. `draw` receives the number
+/// k of allowed actions and returns a number below it.
 template <class Draw>
 std::size_t draw_allowed(ActionMask mask, std::size_t n, const Draw& draw) {
   if (mask.empty()) return draw(n);
-  std::size_t left = draw(
-      static_cast<std::size_t>(std::ranges::count_if(mask, [](auto entry) { return entry != 0; })));
+  std::size_t n_before = draw(static_cast<std::size_t>(std::ranges::count(mask, 1)));
   std::size_t action = 0;
-  while (mask[action] == 0 || left-- > 0) ++action;
+  while (mask[action] == 0 || n_before-- > 0) ++action;
   return action;
 }
 
@@ -70,8 +80,7 @@ void require_mask(std::string_view name, ActionMask mask, std::size_t n_dimensio
   }
 }
 
-/// Throws std::invalid_argument unless an action has an index for each dimension, below
-/// `n_actions(d)` in dimension d.
+/// Throws std::invalid_argument unless there is an index below `n_actions(d)` per dimension d.
 template <class NActions>
 void require_action(std::span<const std::size_t> action, std::size_t n_dimensions,
                     const NActions& n_actions) {
@@ -81,13 +90,29 @@ void require_action(std::span<const std::size_t> action, std::size_t n_dimension
   }
 }
 
-/// Lists a mask that an agent remembers, where there is one; see core/state.hpp.
+/// Lists an action: an index below `n_actions(d)` for each dimension d; see core/state.hpp.
+template <class Action, class Archive, class NActions>
+void serialize_action(std::string_view name, Action& action, Archive& archive,
+                      const NActions& n_actions) {
+  std::vector<std::int64_t> indices(action.begin(), action.end());
+  archive.numbers(name, indices);
+  if constexpr (Archive::kReads) {
+    archive.expect(indices.size() == action.size(), name, "one per dimension");
+    for (std::size_t d = 0; d < action.size(); ++d) {
+      archive.expect(indices[d] >= 0 && static_cast<std::uint64_t>(indices[d]) < n_actions(d), name,
+                     "an action");
+      action[d] = static_cast<std::size_t>(indices[d]);
+    }
+  }
+}
+
+/// Lists a mask that an agent remembers, if it is not empty; see core/state.hpp.
 template <class Mask, class Archive, class NActions>
 void serialize_mask(std::string_view name, Mask& mask, Archive& archive, std::size_t n_dimensions,
                     const NActions& n_actions) {
   archive.some_numbers(name, mask);
   if constexpr (Archive::kReads) {
-    archive.taking(name, [&] { require_mask("mask", mask, n_dimensions, n_actions); });
+    archive.naming(name, [&] { require_mask("mask", mask, n_dimensions, n_actions); });
   }
 }
 

@@ -21,7 +21,7 @@
 
 namespace sdnn::agents {
 
-/// The numbers that a task takes for an action.
+/// The type of the numbers that a task accepts as actions.
 enum class ActionNumber {
   float64,
   float32,
@@ -53,13 +53,13 @@ struct ActionConfig {
 /// Converts actions between an agent and its task.
 ///
 /// In a box, dimension d has n_actions[d] values at even distances from low to high
-/// (coding::action_value). If n_actions[d] is 0, a number a in [-1, 1] stands for the value
-/// (low + high) / 2 + (high - low) / 2 a. Values are rounded to the type of the task's actions. A
-/// discrete action is low plus the index.
+/// (coding::action_value). If n_actions[d] is 0, a number a in [-1, 1] stands for the value (low +
+/// high) / 2 + (high - low) / 2 a. Values are rounded to the task's type. A discrete action is low
+/// plus the index.
 class Actions {
  public:
-  static constexpr std::size_t kMostDimensions = 1024;
-  static constexpr double kMostActions = 1 << 20;
+  static constexpr std::size_t kMostDimensions = 1024;  ///< chosen
+  static constexpr double kMostActions = 1 << 20;       ///< of a dimension, chosen
 
   /// Divides each dimension of a box into `n_in_box` actions; 0 stands for real numbers. Throws
   /// std::invalid_argument naming the field that does not fit.
@@ -108,8 +108,7 @@ class Actions {
     return static_cast<std::size_t>(std::nearbyint(share * static_cast<double>(n_actions_[d] - 1)));
   }
 
-  /// Converts an agent's action, an index or a number in [-1, 1] for each dimension, to the units
-  /// of the task and to indices.
+  /// Converts an agent's action, indices or numbers, to the units of the task and to indices.
   template <class Number>
   void take(std::span<const Number> action, std::vector<double>& in_units,
             std::vector<std::size_t>& indices) const {
@@ -123,7 +122,7 @@ class Actions {
     }
   }
 
-  /// Draws a random action of each dimension: the index of an allowed one, or a number in [-1, 1].
+  /// Draws an action as agents have it: an allowed index per dimension, or a number in [-1, 1].
   void draw(core::Pcg64& random, std::vector<double>& action, ActionMask mask = {}) const {
     const auto below = [&random](std::size_t n) {
       return static_cast<std::size_t>(random.below(static_cast<std::uint32_t>(n)));
@@ -135,14 +134,10 @@ class Actions {
     }
   }
   /// Whether a mask allows an action that `draw` returned.
-  bool allows_drawn(std::span<const double> action, ActionMask mask) const noexcept {
-    for (std::size_t d = 0; d < action.size() && !mask.empty(); ++d) {
-      const ActionMask dimension_mask = take_part(mask, n_actions_[d]);
-      if (!allows(dimension_mask, static_cast<std::size_t>(action[d]))) return false;
-    }
-    return true;
+  bool allows_drawn(std::span<const double> action, ActionMask mask) const {
+    return allows_action(mask, action, [this](std::size_t d) { return n_actions_[d]; });
   }
-  /// Whether `draw` may give these numbers.
+  /// Whether these are numbers that `draw` can return.
   bool can_be_drawn(std::span<const double> action) const noexcept {
     for (std::size_t d = 0; d < action.size(); ++d) {
       const auto n = static_cast<double>(n_actions_[d]);

@@ -52,7 +52,7 @@ class ActorCritic : public IndexAgent<ActorCritic> {
   using Readout = approximators::LinearSDNN;
   using Policy = SoftmaxPolicy;
 
-  /// The memory of one reader.
+  /// The memory in which a thread reads the agent.
   struct Workspace {
     Readout::Workspace critic;
     Policy::Workspace actor;
@@ -60,8 +60,7 @@ class ActorCritic : public IndexAgent<ActorCritic> {
     std::vector<std::size_t> action;
   };
 
-  /// Takes a critic of one action. Throws std::invalid_argument naming the field that is out of
-  /// range.
+  /// Takes a critic of one action. Throws std::invalid_argument naming a field out of range.
   ActorCritic(Readout critic, std::vector<std::size_t> n_actions, const ActorCriticConfig& config,
               std::uint64_t seed)
       : config_(config),
@@ -92,7 +91,8 @@ class ActorCritic : public IndexAgent<ActorCritic> {
   double learning_rate() const noexcept { return static_cast<double>(rate_) / kOne; }
   double epsilon() const noexcept { return 0.0; }
 
-  /// Ends the traces. Throws std::invalid_argument if there is no such environment.
+  /// Begins an episode: ends the traces. Throws std::invalid_argument if the environment does not
+  /// exist.
   void begin_episode(std::size_t environment = 0) {
     Episode& episode = episodes_.of(environment);
     end(episode);
@@ -131,8 +131,7 @@ class ActorCritic : public IndexAgent<ActorCritic> {
     actor_.read(workspace.critic.code(), workspace.actor);
   }
 
-  /// Returns the offset from an action to the mean of it and its neighbours, weighted by their
-  /// probabilities in the state that the workspace holds; see SoftmaxPolicy.
+  /// Returns SoftmaxPolicy::mean_offset in the state that the workspace, or the agent, read last.
   double mean_offset(const Workspace& workspace, std::size_t d, std::size_t action) const {
     return actor_.mean_offset(workspace.actor, d, action);
   }
@@ -156,7 +155,7 @@ class ActorCritic : public IndexAgent<ActorCritic> {
     }
     episode.has_acted = false;
     episode.dt = dt;
-    critic().read_next(state, episode.next);  // acting may have read it already
+    critic().read_next(state, episode.next);  // at no cost if acting has read it
     std::swap(episode.present, episode.next);
     critic().read_next(next_state, episode.next);
     ++n_learned_;
@@ -166,7 +165,7 @@ class ActorCritic : public IndexAgent<ActorCritic> {
     if (!terminated) {
       next = td_.in_range(episodes_, [&] { return critic().sum(episode.next, kOnlyAction); });
     }
-    const bool is_allowed = allows_action(episode.mask, action);
+    const bool is_allowed = allows_action(episode.mask, action, n_actions_of());
     learn_step(episode, action, reward, next, terminated ? nullptr : &episode.next.code(),
                is_allowed ? ActionMask(episode.mask) : ActionMask());
     if (terminated) {
@@ -200,7 +199,7 @@ class ActorCritic : public IndexAgent<ActorCritic> {
     end(episode);
   }
 
-  /// Makes the unit of values smaller where it is larger than it has to be; see QLambda.
+  /// Makes the unit of values smaller if it is larger than necessary; see LinearTD.
   void refine_unit(std::int32_t size_in_window, std::int32_t size) {
     td_.refine_unit(size_in_window, size, episodes_);
   }
@@ -238,14 +237,14 @@ class ActorCritic : public IndexAgent<ActorCritic> {
   struct Episode {
     approximators::LinearTrace trace;  ///< of the critic
     approximators::LinearTrace actor_trace;
-    Readout::Workspace present;      ///< of the state that is learned
-    Readout::Workspace next;         ///< of the state after it, or another
+    Readout::Workspace present;      ///< the code of the state that is learned
+    Readout::Workspace next;         ///< the code of the state that was read last
     std::vector<double> next_state;  ///< where the last transition ended; empty: it terminated
-    std::vector<std::uint8_t> mask;  ///< of the present state
-    bool has_acted = false;          ///< since the last transition: the mask is that of the act
-    std::int64_t old_value = 0;      ///< V_old, in units
+    std::vector<std::uint8_t> mask;  ///< of the state in which the next action is taken
+    bool has_acted = false;          ///< whether the mask is that of an act not learned yet
+    std::int64_t old_value = 0;      ///< V_old, in the critic's units
     double dt = 1.0;                 ///< the duration of the transition that is learned
-    double trace_dt = 1.0;           ///< that of the one before, see LinearTD
+    double trace_dt = 1.0;           ///< the duration of the one before, see LinearTD
   };
 
   /// The state of an environment before its first step.
@@ -267,14 +266,11 @@ class ActorCritic : public IndexAgent<ActorCritic> {
     serialize_duration("trace_dt", episode.trace_dt, archive);
     archive.numbers("next_state", episode.next_state);
     archive.number("has_acted", episode.has_acted);
-    serialize_mask("mask", episode.mask, archive, self.n_dimensions(),
-                   [&self](std::size_t d) { return self.n_actions(d); });
+    serialize_mask("mask", episode.mask, archive, self.n_dimensions(), self.n_actions_of());
     if constexpr (Archive::kReads) {
-      const auto is_unit = [](double x) { return x >= 0.0 && x <= 1.0; };
-      archive.expect(
-          episode.next_state.empty() || (episode.next_state.size() == self.n_inputs() &&
-                                         std::ranges::all_of(episode.next_state, is_unit)),
-          "next_state", "a state in [0, 1], or empty");
+      archive.expect(episode.next_state.empty() || (episode.next_state.size() == self.n_inputs() &&
+                                                    core::are_unit_values(episode.next_state)),
+                     "next_state", "a state in [0, 1], or empty");
       archive.expect(!Readout::is_too_large(episode.old_value), "old_value", "below 2^33 in size");
     }
   }
@@ -291,14 +287,6 @@ class ActorCritic : public IndexAgent<ActorCritic> {
       rate_ = std::max(1, static_cast<std::int32_t>(std::lround(*rates_.set_learning_rate * kOne)));
     }
     actor_rate_ = by_steps(config_.actor_learning_rate, config_.final_actor_learning_rate);
-  }
-
-  /// Whether the mask allows the action in every dimension.
-  bool allows_action(ActionMask mask, Action action) const noexcept {
-    for (std::size_t d = 0; d < action.size(); ++d) {
-      if (!allows(take_part(mask, n_actions(d)), action[d])) return false;
-    }
-    return true;
   }
 
   core::Random& evaluation_ties() noexcept { return ties_; }
@@ -328,8 +316,7 @@ class ActorCritic : public IndexAgent<ActorCritic> {
     episode.next_state.clear();
   }
 
-  /// Learns one step; `next` is V(s') in the critic's unit, `next_code` that of s', unless it is
-  /// terminal.
+  /// Learns one step; `next` is V(s') in the critic's units. Without a next code s' is terminal.
   void learn_step(Episode& episode, Action action, double reward, std::int64_t next,
                   const approximators::LinearCode* next_code, ActionMask mask) {
     const bool is_dutch = n_environments() == 1;
@@ -341,7 +328,7 @@ class ActorCritic : public IndexAgent<ActorCritic> {
                   .rate = actor_rate_,
                   .entropy = static_cast<std::int32_t>(std::lround(config_.entropy * kOne)),
                   .decay = td_.decay(episode)},
-                 // Another environment learns before the preferences of s' are read.
+                 // Another environment would change the weights before an act in s'.
                  n_environments() == 1 ? next_code : nullptr);
     td_.correct(episode, episodes_, kOnlyAction, error, rate_, is_dutch);
   }

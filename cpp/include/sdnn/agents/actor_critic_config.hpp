@@ -8,8 +8,8 @@
 
 namespace sdnn::agents {
 
-/// The agent's parameters, with defaults for any task. The defaults were tuned with seeds from 1000
-/// on, which no published result uses.
+/// The agent's parameters; the defaults, for any task, were tuned with seeds from 1000 on, which no
+/// published result uses.
 struct ActorCriticConfig {
   double learning_rate = 0.5;
   double discount = 0.99;

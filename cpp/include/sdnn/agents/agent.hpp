@@ -23,8 +23,7 @@ namespace sdnn::agents {
 /// |                                                         | other                              |
 /// | agent.learn(state, action, reward, next, terminated)    | learns the transition              |
 ///
-/// The caller calls begin_episode at the start of each episode: learn does not, even after a
-/// transition that terminated.
+/// The caller begins each episode: learn does not, even after a transition that terminated.
 template <class A>
 concept Agent = requires(A agent, const A& const_agent, std::span<const double> state,
                          double reward, bool flag) {

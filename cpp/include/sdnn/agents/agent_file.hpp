@@ -63,7 +63,7 @@ nlohmann::json json_of(const Value& value) {
   }
 }
 
-/// Throws std::invalid_argument with the value, of which long ones are cut to a line.
+/// Throws std::invalid_argument "<name> must be <expected>, got <value>", with long values cut.
 [[noreturn]] inline void refuse(const std::string& name, const std::string& expected,
                                 const nlohmann::json& value) {
   std::string shown = value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
@@ -72,19 +72,19 @@ nlohmann::json json_of(const Value& value) {
   throw std::invalid_argument(name + " must be " + expected + ", got " + shown);
 }
 
-/// Reads a value. Throws std::invalid_argument naming it where it is of another type.
+/// Reads a value. Throws std::invalid_argument with its `name` if the JSON has another type.
 template <class Value>
 Value value_from(const nlohmann::json& json, const std::string& name) {
   if constexpr (IsOptional<Value>::value) {
     if (json.is_null()) return std::nullopt;
     return value_from<typename Value::value_type>(json, name);
   } else if constexpr (std::is_enum_v<Value>) {
-    const auto words = words_of(Value{});
-    const auto word = std::ranges::find_if(words, [&json](auto known) { return json == known; });
+    const auto names = words_of(Value{});
+    const auto match = std::ranges::find_if(names, [&json](auto known) { return json == known; });
     std::string expected = "one of";
-    for (const auto known : words) (expected += ' ') += known;
-    if (word == words.end()) refuse(name, expected, json);
-    return static_cast<Value>(word - words.begin());
+    for (const auto known : names) (expected += ' ') += known;
+    if (match == names.end()) refuse(name, expected, json);
+    return static_cast<Value>(match - names.begin());
   } else if constexpr (std::is_same_v<Value, bool>) {
     if (!json.is_boolean()) refuse(name, "true or false", json);
     return json.get<bool>();
@@ -117,13 +117,13 @@ Value value_from(const nlohmann::json& json, const std::string& name) {
   }
 }
 
-/// A member of an object. Throws std::invalid_argument naming it where it is missing.
+/// Returns member `key` of an object called `name`. Throws std::invalid_argument if it is missing.
 inline const nlohmann::json& member(const nlohmann::json& object, const char* key,
                                     const std::string& name) {
   if (!object.is_object()) refuse(name, "an object", object);
-  const auto found = object.find(key);
-  if (found == object.end()) throw std::invalid_argument(name + "." + key + " must be there");
-  return *found;
+  const auto value = object.find(key);
+  if (value == object.end()) throw std::invalid_argument(name + "." + key + " must be there");
+  return *value;
 }
 
 }  // namespace detail
@@ -148,10 +148,10 @@ Config config_from_json(const nlohmann::json& object, const std::string& name) {
   Config config;
   std::size_t n_known = 0;
   const auto read = [&](const auto& field) {
-    const auto found = object.find(field.name);
-    if (found == object.end()) return;
+    const auto value = object.find(field.name);
+    if (value == object.end()) return;
     using Value = core::FieldValue<std::remove_cvref_t<decltype(field)>, Config>;
-    field.of(config) = detail::value_from<Value>(*found, name + "." + field.name);
+    field.of(config) = detail::value_from<Value>(*value, name + "." + field.name);
     ++n_known;
   };
   const auto is_known = [](const std::string& key) {
@@ -172,11 +172,11 @@ Config config_from_json(const nlohmann::json& object, const std::string& name) {
 
 namespace detail {
 
-/// The name of a type of agent in files, and of its class in Python. The table below has the order
-/// of AnyApproximatorConfig, then the actor-critic.
+/// The name of a type of agent in files, and of its class in Python.
 struct AgentKind {
   std::string_view name, class_in_python;
 };
+/// All types in the order of AnyApproximatorConfig, and last the actor-critic (a linear readout).
 inline constexpr std::array<AgentKind, 5> kAgentKinds{{{"sdnn-c", "SDNNQLearning"},
                                                        {"rbf", "RBFQLearning"},
                                                        {"fuzzy", "FuzzyQLearning"},
@@ -248,7 +248,7 @@ inline void describe(const ControllerConfig& config, nlohmann::json& description
 
 }  // namespace detail
 
-/// A controller, and what else is in its file: spaces of Gymnasium, or a training in Python.
+/// A controller, and other data in its file, such as spaces of Gymnasium or a training.
 class AgentFile {
  public:
   /// Takes a controller that is not in a file yet.
@@ -256,8 +256,7 @@ class AgentFile {
     detail::describe(controller.config(), content_.description);
   }
 
-  /// Reads a file of an agent or a training. Throws std::runtime_error naming the file and what is
-  /// wrong with it.
+  /// Reads a file of an agent or a training. Throws std::runtime_error naming file and problem.
   explicit AgentFile(const std::filesystem::path& path)
       : AgentFile(core::read_file(path, {"agent", "training"}), path.string()) {}
 
@@ -275,12 +274,13 @@ class AgentFile {
   Controller controller;
 
  private:
-  static constexpr std::string_view kOfTraining = "training.";  // names of a training's tensors
+  static constexpr std::string_view kOfTraining = "training.";  // prefix of a training's tensors
 
   AgentFile(core::FileContent content, const std::string& name)
       : controller(controller_in(content, name)), content_(std::move(content)) {}
 
-  /// Takes the controller's tensors out of the content.
+  /// Makes the controller, and moves its tensors out of the content, which keeps those of a
+  /// training.
   static Controller controller_in(core::FileContent& content, const std::string& name) {
     core::State state = std::exchange(content.tensors, {});
     for (auto tensor = state.begin(); tensor != state.end();) {
@@ -294,6 +294,7 @@ class AgentFile {
     }
   }
 
+  /// The content of the file without the tensors of the controller.
   core::FileContent content_{
       .kind = "agent", .description = nlohmann::json::object(), .tensors = {}};
 };

@@ -36,7 +36,7 @@ namespace sdnn::agents {
 using AnyAgent = std::variant<QLearning<approximators::SDNNC>, QLearning<approximators::RBFNetwork>,
                               FuzzyQLearning, QLambda, ActorCritic>;
 
-/// The memory of one reader of an agent of any kind.
+/// The workspace of an agent of any kind, in which a thread reads it.
 template <class Agents>
 struct WorkspacesOf;
 template <class... Agent>
@@ -85,15 +85,16 @@ inline std::size_t n_actions_in_box(const AnyApproximatorConfig& config) {
 
 namespace detail {
 
-/// Returns base^exponent, or a number of at least 1e300 if it is larger.
+/// Returns base^exponent; if it is 1e300 or more, any number of at least 1e300.
 inline double power(int base, int exponent) {
   double product = 1.0;
   for (int i = 0; i < exponent && product < 1e300; ++i) product *= base;
   return product;
 }
 
-/// Limits the memory of code books, which files do not contain: to the default limit of all tables,
-/// or to the memory of the weights, if that is larger.
+/// Throws std::invalid_argument if the code books of an agent, one set for each dimension, would
+/// need more memory than the default limit of a table, or than its weights if these are larger.
+/// Files do not contain code books, so damaged settings could make them of any size.
 template <class Config>
 void expect_code_room(const Config& config, double weight_bytes, double n_dimensions) {
   const double n_bytes = coding::pattern_bytes_of(config, coding::n_bins_of(config));
@@ -105,7 +106,8 @@ void expect_code_room(const Config& config, double weight_bytes, double n_dimens
 }  // namespace detail
 
 /// Throws std::invalid_argument unless the agent's arrays in a saved state have the sizes that
-/// follow from the settings: a damaged file must not cause large allocations.
+/// follow from the settings. It is called before memory is allocated by the settings, so that a
+/// damaged file cannot cause large allocations. With `has_tables` the state has the code books.
 template <class Reader>
 void expect_sizes(const Reader& reader, const AnyApproximatorConfig& config,
                   const AnyLearningConfig& learning, const std::vector<std::size_t>& n_actions,
@@ -149,7 +151,8 @@ void expect_sizes(const Reader& reader, const AnyApproximatorConfig& config,
 namespace detail {
 
 /// Makes an approximator for each dimension of actions by `make(config, seed)`. They differ in
-/// their numbers of actions and in their seeds, and share one limit of memory.
+/// their numbers of actions and in their seeds, and share the limit of memory equally. The number
+/// of a single dimension, or of real numbers (n_actions[d] = 0), is the configuration's.
 template <class Config, class Make>
 auto each_dimension(Config config, const std::vector<std::size_t>& n_actions, std::uint64_t seed,
                     const Make& make) {
@@ -162,14 +165,20 @@ auto each_dimension(Config config, const std::vector<std::size_t>& n_actions, st
   }
   return parts;
 }
+/// `make` for approximators without random numbers.
+template <class Approximator>
+constexpr auto kMakeUnseeded =
+    [](const auto& config, std::uint64_t /*seed*/) { return Approximator(config); };
 
 }  // namespace detail
 
-/// Makes an agent with n_actions[d] actions in each dimension d. `tables` are the patterns of each
-/// input (with SDNN-C only for actions of one dimension); without them inputs may have an
-/// additional pattern for missing readings, which is the last one of symbols. `n_first` inputs of a
-/// linear readout existed before others were added; see LinearSDNN. Throws std::invalid_argument or
+/// Makes an agent with n_actions[d] actions in each dimension d. Throws std::invalid_argument or
 /// std::length_error for impossible settings of a part.
+///
+/// `tables` are the custom patterns of each input; with SDNN-C they require actions of one
+/// dimension. Without them, the patterns of an input follow from the settings; with `codes_missing`
+/// there is another for missing readings, the last one. `n_first` inputs of a linear readout
+/// existed before others were added, 0 if none was; see LinearSDNN.
 inline AnyAgent make_agent(const AnyApproximatorConfig& config, const AnyLearningConfig& learning,
                            const std::vector<std::size_t>& n_actions, std::uint64_t seed,
                            const std::vector<coding::PatternTable>& tables = {},
@@ -187,10 +196,7 @@ inline AnyAgent make_agent(const AnyApproximatorConfig& config, const AnyLearnin
                 "tables", "None where actions have several dimensions", tables.size());
   if (const auto* const rules = std::get_if<FuzzyRulesConfig>(&config)) {
     return FuzzyQLearning(
-        detail::each_dimension(*rules, n_actions, seed,
-                               [](const FuzzyRulesConfig& dimension_rules, std::uint64_t) {
-                                 return FuzzyRules(dimension_rules);
-                               }),
+        detail::each_dimension(*rules, n_actions, seed, detail::kMakeUnseeded<FuzzyRules>),
         std::get<FuzzyQLearningConfig>(learning), seed);
   }
   if (const auto* const linear = std::get_if<LinearSDNNConfig>(&config)) {
@@ -208,11 +214,9 @@ inline AnyAgent make_agent(const AnyApproximatorConfig& config, const AnyLearnin
   }
   const auto& rule = std::get<QLearningConfig>(learning);
   if (const auto* const rbf = std::get_if<RBFNetworkConfig>(&config)) {
-    return QLearning(detail::each_dimension(*rbf, n_actions, seed,
-                                            [](const RBFNetworkConfig& network, std::uint64_t) {
-                                              return RBFNetwork(network);
-                                            }),
-                     rule, seed);
+    return QLearning(
+        detail::each_dimension(*rbf, n_actions, seed, detail::kMakeUnseeded<RBFNetwork>), rule,
+        seed);
   }
   const auto make = [&](const SDNNCConfig& network, std::uint64_t network_seed) {
     if (!tables.empty()) return SDNNC(network, tables, network_seed);

@@ -68,8 +68,7 @@ class CompiledController {
   /// Makes an agent. Throws std::invalid_argument naming the member or setting, what was expected
   /// and what was given; std::length_error if the agent would exceed its limit of memory.
   explicit CompiledController(const AgentSpec& spec);
-  /// Reads a file of an agent or a training. Throws std::runtime_error naming the file and what is
-  /// wrong with it.
+  /// Reads a file of an agent or a training. Throws std::runtime_error naming file and problem.
   explicit CompiledController(const std::filesystem::path& path);
   CompiledController(CompiledController&&) noexcept;
   CompiledController& operator=(CompiledController&&) noexcept;
@@ -97,8 +96,7 @@ class CompiledController {
   void begin_greedy_episode(std::size_t environment = 0);
 
   /// Returns the action to take, a best one without `explore`. Valid until the next act. Throws
-  /// std::invalid_argument naming an unusable number of the observation, mask or environment; then
-  /// nothing has changed.
+  /// std::invalid_argument, and changes nothing, for an unusable observation, mask or environment.
   std::span<const double> act(std::span<const double> observation, bool explore = true,
                               std::size_t environment = 0, Mask mask = {});
 

@@ -19,8 +19,8 @@
 #include "sdnn/agents/controller_config.hpp"
 #include "sdnn/agents/detail/approximator_of.hpp"
 #include "sdnn/agents/detail/greedy_action.hpp"
+#include "sdnn/agents/detail/last_actions.hpp"
 #include "sdnn/agents/detail/last_states.hpp"
-#include "sdnn/agents/detail/taken_actions.hpp"
 #include "sdnn/agents/duration.hpp"
 #include "sdnn/agents/exploration.hpp"
 #include "sdnn/agents/fuzzy_q_learning.hpp"
@@ -53,8 +53,7 @@ namespace sdnn::agents {
 /// Thread safety: const functions may be called by many threads at once, with a workspace each.
 class Controller : public WithRates<Controller> {
  public:
-  /// The memory of one reader, for the controller that made it after its warm-up, at any later
-  /// time.
+  /// The memory in which a thread reads the controller, valid while identity() stays the same.
   struct Workspace {
     AnyWorkspace agent;
     std::vector<double> state, action, held;
@@ -89,7 +88,7 @@ class Controller : public WithRates<Controller> {
   const AnyApproximatorConfig& approximator() const noexcept { return approximator_; }
   const Observations& observations() const noexcept { return observations_; }
   const Actions& actions() const noexcept { return actions_; }
-  /// The part of earlier observations in states; none during the warm-up.
+  /// The filter by which states depend on earlier observations; without effect in the warm-up.
   const HistoryFilter& history() const noexcept { return last_states_.history(); }
   std::size_t n_variables() const noexcept { return observations_.n_variables(); }
   std::size_t n_dimensions() const noexcept { return actions_.n_dimensions(); }
@@ -97,7 +96,7 @@ class Controller : public WithRates<Controller> {
   /// Whether it still acts at random to find the ranges of its observations.
   bool is_warming_up() const noexcept { return warm_up_.has_value(); }
 
-  /// The agent in itself, with states in [0, 1]. Requires that the warm-up is over.
+  /// The agent, whose states are in [0, 1]. Requires that the warm-up is over.
   AnyAgent& agent() { return agent_.value(); }
   const AnyAgent& agent() const { return agent_.value(); }
 
@@ -121,7 +120,7 @@ class Controller : public WithRates<Controller> {
       std::visit([n](auto& agent) { agent.set_n_environments(n); }, *agent_);
       if (latest_) latest_->set_n_environments(n);
     }
-    taken_.forget_from(n);
+    last_actions_.forget_from(n);
     last_states_.forget_from(n);
     readings_.forget_from(n);
   }
@@ -139,7 +138,7 @@ class Controller : public WithRates<Controller> {
     }
     readings_.forget(environment);
   }
-  /// Begins a greedy episode: later acts without `explore` use no earlier readings.
+  /// Begins a greedy episode: later acts without `explore` do not continue the learned one.
   void begin_greedy_episode(std::size_t environment = 0) {
     require_environment(environment);
     readings_.forget_greedy(environment);
@@ -169,7 +168,7 @@ class Controller : public WithRates<Controller> {
         *agent_);
     last_states_.keep(observations_, environment, explore);
     last_states_.note_action(environment, action_, explore);
-    if (explore && !is_fuzzy(approximator_)) taken_.note(environment, action_, indices_);
+    if (explore && !is_fuzzy(approximator_)) last_actions_.note(environment, action_, indices_);
     readings_.note(held_, environment, !explore);
     return action_;
   }
@@ -183,7 +182,7 @@ class Controller : public WithRates<Controller> {
             std::vector<std::size_t>(n_dimensions()),
             {}};
   }
-  /// A number that no other controller has.
+  /// A number that no other controller has. It changes when inputs are added.
   std::uint64_t identity() const noexcept { return identity_.number(); }
 
   /// Returns the greedy action without changing the controller, so that several threads may call
@@ -246,10 +245,10 @@ class Controller : public WithRates<Controller> {
         *agent_);
   }
 
-  /// The size of recent rewards, and the first reward that was too large to be learned.
+  /// The size of recent rewards, and the first reward that was refused as far too large.
   const RewardScale& reward_scale() const noexcept { return reward_scale_; }
-  /// The number of learned transitions: those of a warm-up count, unless the agent is on-policy,
-  /// steps of excursions do not.
+  /// The number of learned transitions. Those of a warm-up count, unless the agent is on-policy;
+  /// steps of excursions do not. Where an agent does not count itself, refused rewards count, too.
   std::uint64_t n_learned() const;
 
   /// Learns a transition, unless its reward is far larger than the recent ones; see RewardScale.
@@ -283,13 +282,14 @@ class Controller : public WithRates<Controller> {
     if (latest_ && latest_->learn(step)) add_inputs();
   }
 
-  /// Throws what learn would for a transition that cannot be learned; changes nothing.
+  /// Throws std::invalid_argument for a transition that learn would refuse; changes nothing.
   void check(std::span<const double> observation, std::span<const double> action, double reward,
              std::span<const double> next_observation, bool terminated, std::size_t environment,
              ActionMask next_mask, double dt = 1.0) const;
 
   /// Ends a warm-up in which a teacher acted. Ranges extend beyond the observations by twice their
-  /// width on each side, because the agent will leave the teacher's path.
+  /// width at each end, because the agent will leave the teacher's path. Throws
+  /// std::invalid_argument without a warm-up, or one without transitions.
   void end_warm_up_of_teacher();
   /// Learns an action that a teacher chose, and its return; see QLambda::imitate. Requires that the
   /// warm-up is over. Throws std::invalid_argument for an unusable observation and for agents
@@ -297,11 +297,12 @@ class Controller : public WithRates<Controller> {
   void imitate(std::span<const double> observation, std::span<const double> action, double value,
                double margin);
 
-  /// Continues the episode of environment 0 with a teacher's action, and learns nothing, so that
-  /// later observations get their values. Throws std::invalid_argument like imitate.
+  /// Continues the episode of environment 0 by a teacher's action, for the history and the held
+  /// readings of later observations. Learns nothing. Throws std::invalid_argument like imitate.
   void follow_teacher(std::span<const double> observation, std::span<const double> action);
 
-  /// The state of an observation, valid until the next call. Throws std::invalid_argument.
+  /// Returns the state of an observation in the greedy episode of environment 0, valid until the
+  /// next call. Throws std::invalid_argument for an unusable observation.
   std::span<const double> state_of(std::span<const double> observation) {
     last_states_.peek(observations_, 0, readings_.filled(observation, 0, true, held_), state_,
                       peeked_);
@@ -330,7 +331,7 @@ class Controller : public WithRates<Controller> {
         actions_(config_.action, n_actions_in_box(approximator_)),
         notes_(n_variables()),
         readings_(observations_.last_readings()),
-        taken_(n_dimensions()) {
+        last_actions_(n_dimensions()) {
     core::check_fields(config_);
     action_.resize(n_dimensions());
     indices_.resize(n_dimensions());
@@ -345,7 +346,7 @@ class Controller : public WithRates<Controller> {
                      ActionMask mask);
   void remember(const WarmUp::Step& step);
   void end_warm_up(double headroom = Observations::kHeadroom);
-  void watch();
+  void watch_for_inputs();
   void add_inputs();
   void replay(const WarmUp::Step& step, LastReadings& readings);
   template <class Archive>
@@ -353,7 +354,7 @@ class Controller : public WithRates<Controller> {
   template <class Archive>
   void end_reading(const Archive& archive);
 
-  /// Changes the rates of the agent, if there is one that has them.
+  /// Makes a change of rates in the agent, if there is one and it has rates.
   void apply_rates(const auto& change) {
     if (!agent_) return;
     std::visit(
@@ -363,7 +364,7 @@ class Controller : public WithRates<Controller> {
         *agent_);
   }
 
-  /// Returns of_agent(agent), or of_config(config) during the warm-up; 0 where there are no rates.
+  /// Returns of_agent(agent), or of_config(config) in the warm-up; 0 for agents without rates.
   double rate(const auto& of_agent, const auto& of_config) const {
     const auto agent_rate = [&of_agent](const auto& agent) {
       if constexpr (requires { agent.learning_rate(); }) return of_agent(agent);
@@ -381,6 +382,7 @@ class Controller : public WithRates<Controller> {
     return std::get<typename Agent::Workspace>(workspace.agent);
   }
 
+  /// Writes the state of an observation into the workspace; see state_of.
   void find_state(std::span<const double> observation, Workspace& workspace) const {
     last_states_.peek(observations_, 0, readings_.filled(observation, 0, true, workspace.held),
                       workspace.state, workspace.room);
@@ -397,21 +399,8 @@ class Controller : public WithRates<Controller> {
     if (latest_) latest_->begin_episode(environment);
   }
 
-  /// Finds the indices of an action: those of the last exploring act if it took the same action,
-  /// since rounding can make several indices one action. Fuzzy agents know only that action.
-  void find_indices(std::span<const double> action, std::size_t environment) {
-    actions_.require_action(action);
-    if (auto* const fuzzy = std::get_if<FuzzyQLearning>(&*agent_)) {
-      actions_.take(fuzzy->last_action(environment), action_, indices_);
-      core::require(fuzzy->explored_in(state_, environment) && std::ranges::equal(action, action_),
-                    "observation and action", "those of the last exploring act", "others");
-      return;
-    }
-    if (taken_.find(environment, action, indices_)) return;
-    for (std::size_t d = 0; d < action.size(); ++d) indices_[d] = actions_.index_of(action[d], d);
-  }
-
-  /// The action to learn: the indices, or the last action of fuzzy rules, which can learn no other.
+  void find_indices(std::span<const double> action, std::size_t environment);
+  /// The action to learn, after find_indices: the indices, or numbers of a fuzzy agent.
   std::span<const std::size_t> learned_action(const auto& /*agent*/, std::size_t) const {
     return indices_;
   }
@@ -425,7 +414,7 @@ class Controller : public WithRates<Controller> {
 
   ControllerConfig config_;
   std::vector<coding::PatternTable> tables_;
-  AnyApproximatorConfig approximator_;  ///< as used
+  AnyApproximatorConfig approximator_;  ///< with the sizes of the task once the warm-up is over
   Observations observations_;
   Actions actions_;
   RangeNotes notes_;
@@ -433,9 +422,10 @@ class Controller : public WithRates<Controller> {
   std::optional<WarmUp> warm_up_;
   std::optional<AnyAgent> agent_;            ///< once the warm-up is over
   std::optional<LatestTransitions> latest_;  ///< where inputs that are left out can be added
+  /// The last observation with held readings, its state, the state after it, and the last action.
   std::vector<double> held_, state_, next_state_, action_;
-  std::vector<std::size_t> indices_;
-  detail::TakenActions taken_;
+  std::vector<std::size_t> indices_;  ///< of the last action
+  detail::LastActions last_actions_;
   detail::LastStates last_states_;
   detail::LastStates::Room peeked_;
   RewardScale reward_scale_;

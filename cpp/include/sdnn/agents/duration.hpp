@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <iterator>
-#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -13,7 +12,7 @@
 
 namespace sdnn::agents {
 
-/// The limits of a duration dt, in usual steps: those for which discounts are set.
+/// The limits (chosen) of a duration dt, in usual steps: those for which settings give discounts.
 inline constexpr double kShortestDuration = 1e-3;
 inline constexpr double kLongestDuration = 1e6;
 
@@ -32,26 +31,23 @@ inline double discount_over(double discount, double dt) noexcept {
   return dt == 1.0 ? discount : core::power(discount, dt);
 }
 
-/// Lists a duration, unless it is usual.
+/// Lists a duration, unless it is 1, a usual step.
 template <class Archive, class Duration>
 void serialize_duration(std::string_view name, Duration& dt, Archive& archive) {
-  std::optional<double> unusual;
-  if (dt != 1.0) unusual = dt;
-  archive.number(name, unusual);
+  archive.number_unless(name, dt, 1.0);
   if constexpr (Archive::kReads) {
-    dt = unusual.value_or(1.0);
     archive.expect(is_duration(dt), name, "in [0.001, 1000000]");
   }
 }
 
-/// Throws unless durations that were read are those of n rewards, or none, if all are usual.
+/// Throws unless there are durations of n rewards or none, which means that all are 1.
 template <class Archive>
 void expect_durations(const std::vector<double>& dts, std::size_t n, const Archive& archive) {
   archive.expect(dts.empty() || dts.size() == n, "dts", "one per reward, or none");
   archive.expect(std::ranges::all_of(dts, is_duration), "dts", "in [0.001, 1000000]");
 }
 
-/// Lists the durations of n rewards, unless all are usual.
+/// Lists the durations of n rewards, unless all are 1.
 template <class Archive>
 void serialize_durations(std::vector<double>& dts, std::size_t n, Archive& archive) {
   if (std::ranges::count(dts, 1.0) == std::ssize(dts)) dts.clear();

@@ -1,4 +1,4 @@
-/// The state of an agent's present episode, once for each environment that it learns in.
+/// The present episodes of an agent, one for each environment that it learns in.
 #pragma once
 
 #include <cstddef>
@@ -10,18 +10,20 @@
 
 namespace sdnn::agents {
 
-/// The episodes that one agent is in at the same time: one per environment, at least one.
+/// The largest number of environments of an agent, a chosen limit.
+inline constexpr std::size_t kMostEnvironments = std::size_t{1} << 14;
+
+/// The state of the present episode in each environment of an agent, which has at least one.
 template <class Episode>
 class Episodes {
  public:
-  /// The largest number of environments of an agent.
-  static constexpr std::size_t kMost = std::size_t{1} << 14;
-
   explicit Episodes(Episode first) { episodes_.push_back(std::move(first)); }
 
   std::size_t size() const noexcept { return episodes_.size(); }
   auto begin() const noexcept { return episodes_.begin(); }
   auto end() const noexcept { return episodes_.end(); }
+  auto begin() noexcept { return episodes_.begin(); }
+  auto end() noexcept { return episodes_.end(); }
 
   /// The episode of an environment, from 0. Throws std::invalid_argument if it does not exist.
   Episode& of(std::size_t environment) {
@@ -34,17 +36,17 @@ class Episodes {
   }
 
   /// Changes the number of environments: `make()` makes the episodes of new ones, and those of
-  /// removed ones are deleted. Throws std::invalid_argument unless 1 <= n <= kMost.
+  /// removed ones are deleted. Throws std::invalid_argument unless 1 <= n <= kMostEnvironments.
   template <class Make>
   void resize(std::size_t n, const Make& make) {
-    core::require_in_range("n_environments", n, 1, kMost);
+    core::require_in_range("n_environments", n, 1, kMostEnvironments);
     while (episodes_.size() > n) episodes_.pop_back();
     while (episodes_.size() < n) episodes_.push_back(make());
   }
 
-  /// Serializes the members that `list(episode)` lists, for each episode. Those of the first one
-  /// have no prefix, so that with one environment the state looks like that of an agent that cannot
-  /// have several.
+  /// Saves or restores the members that `list(episode)` lists, for each episode; `make()` makes the
+  /// episodes to restore. Names of environment 0 have no prefix, those of another one
+  /// "environment.2.".
   template <class Self, class Archive, class Make, class List>
   static void serialize(Self& self, Archive& archive, const Make& make, const List& list) {
     if constexpr (Archive::kReads) self.resize(archive.n_numbered("environment") + 1, make);

@@ -54,13 +54,10 @@ struct EpsilonGreedyConfig {
   bool operator==(const EpsilonGreedyConfig&) const = default;
 };
 
-/// Returns the largest of `values`, which must not be empty. A maximum is exact in any order.
-///
-/// If some values are NaN, any of the values may be returned (Eigen leaves it open); NaN if all
-/// are.
+/// Returns the largest of one or more values; if some are NaN, any (Eigen leaves it open).
 template <class Value>
 Value best_value(std::span<const Value> values) noexcept {
-  // Eight at a time: quicker than maxCoeff of all, and compilers see that it stays inside.
+  // Eight at a time: quicker than maxCoeff of all, and provably within the span.
   using Eight = Eigen::Array<Value, 8, 1>;
   const Eigen::Map<const Eigen::Array<Value, 8, Eigen::Dynamic>> columns(
       values.data(), 8, static_cast<Eigen::Index>(values.size() / 8));
@@ -73,8 +70,7 @@ Value best_value(std::span<const Value> values) noexcept {
 
 /// Epsilon-greedy selection over a row of action values.
 ///
-/// Learning and evaluation break ties by different random streams, so evaluating an agent never
-/// changes what it learns later.
+/// Evaluation breaks ties by a separate random stream, so it does not change what is learned later.
 class EpsilonGreedy {
  public:
   /// Throws std::invalid_argument naming the field that is out of range.
@@ -128,27 +124,17 @@ class EpsilonGreedy {
   std::size_t best_action(std::span<const Number> numbers, Number least, core::Random& ties) const {
     return select_by_tie_rule(numbers, least, ties);
   }
-  /// The stream that breaks ties in learning, or in evaluation.
+  /// The stream that breaks ties in learning, or without `explore` in evaluation.
   core::Random& ties(bool explore) noexcept { return explore ? ties_ : evaluation_ties_; }
 
-  /// The action for step number `step` (from 0) of an episode; without `explore` always a best one.
-  ///
+  /// Takes the action of step number `step` (from 0) of an episode: a random one, or a best one.
   /// Shape: values (n_actions,). Throws std::invalid_argument if it is empty or the best is NaN.
-  std::size_t select(std::span<const double> values, int step, bool explore) {
-    return select_from(values, step, explore);
-  }
-  std::size_t select(std::span<const float> values, int step, bool explore) {
-    return select_from(values, step, explore);
+  std::size_t select(std::span<const float> values, int step) {
+    core::require(!values.empty(), "values", "not empty", values.size());
+    return explores(step) ? random_action(values.size()) : greedy(values, ties_);
   }
 
  private:
-  template <class Value>
-  std::size_t select_from(std::span<const Value> values, int step, bool explore) {
-    core::require(!values.empty(), "values", "not empty", values.size());
-    if (explore && explores(step)) return random_action(values.size());
-    return greedy(values, explore ? ties_ : evaluation_ties_);
-  }
-
   template <class Value>
   std::size_t greedy(std::span<const Value> values, core::Random& ties) const {
     const Value best = best_value(values);
@@ -178,16 +164,15 @@ class EpsilonGreedy {
         std::ranges::count_if(values, [least](Value value) { return value >= least; }));
   }
 
-  /// The index of value number n, from 0, of those that are at least `least`; there are more than
-  /// n.
+  /// The index of value number n, from 0, of the more than n values that are at least `least`.
   template <class Value>
   static std::size_t nth_of(std::span<const Value> values, Value least, std::uint64_t n) noexcept {
-    constexpr std::size_t kAtOnce = 64;  // counts of whole blocks are vectorized
+    constexpr std::size_t kAtOnce = 64;  // skips whole blocks, which are counted by vectors
     std::size_t i = 0;
     for (; i + kAtOnce < values.size(); i += kAtOnce) {
-      const std::uint64_t n_here = count_of(values.subspan(i, kAtOnce), least);
-      if (n < n_here) break;
-      n -= n_here;
+      const std::uint64_t n_in_block = count_of(values.subspan(i, kAtOnce), least);
+      if (n < n_in_block) break;
+      n -= n_in_block;
     }
     while (values[i] < least || n-- > 0) ++i;
     return i;

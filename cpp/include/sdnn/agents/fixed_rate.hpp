@@ -53,8 +53,7 @@ class FixedRate {
 
   double hz() const noexcept { return hz_; }
 
-  /// Waits for the next tick and returns its number, the periods since the first. The first call
-  /// returns 0 without waiting.
+  /// Waits for the next tick and returns its number. The first call returns 0 without waiting.
   std::int64_t wait() {
     if (tick_ < 0) {
       start_ = clock_();

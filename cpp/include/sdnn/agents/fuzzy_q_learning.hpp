@@ -1,4 +1,4 @@
-/// Fuzzy Q-learning: every fired rule picks an action, the mean of the picks is taken.
+/// Fuzzy Q-learning: every fired rule picks an action, and the agent takes the mean of the picks.
 #pragma once
 
 #include <cstddef>
@@ -32,9 +32,9 @@ namespace sdnn::agents {
 ///
 /// Eligibility traces (trace_decay = lambda > 0; not used in the paper): e(i, a) *= gamma lambda
 /// for all, e(i, a_i) += alpha_i for the picks, then v += c_fql (r + gamma V - Q) e everywhere.
-/// Traces accumulate, a random pick does not cut them, they end with the episode, and one below
+/// Traces accumulate. Random picks do not end them, the end of the episode does; one below
 /// kForgottenTrace is forgotten. In a transition of dt usual steps gamma is gamma^dt, also where it
-/// fades the traces, at the transition after it.
+/// fades the traces, which is at the transition after it.
 ///
 /// An agent may learn in several environments at once, numbered from 0: what belongs to an episode
 /// (the last exploring act, the traces, the number of steps) is then kept for each.
@@ -48,7 +48,7 @@ class FuzzyQLearning {
  public:
   using Action = std::span<const double>;
 
-  /// The memory of one reader: the rules that fire in a state, for each dimension.
+  /// The memory in which a thread reads the agent: the rules that fire in a state, by dimension.
   struct Workspace {
     std::vector<approximators::FiredRules> fired;
     std::vector<double> values, action;
@@ -56,8 +56,7 @@ class FuzzyQLearning {
 
   /// Takes the rules of each dimension of actions. Throws std::invalid_argument naming the field
   /// that is out of range, or unless there are rules and all have the same inputs;
-  /// std::length_error if the rules that fire at once and their traces need more than
-  /// max_table_bytes.
+  /// std::length_error if firing rules and traces need more than max_table_bytes.
   FuzzyQLearning(std::vector<approximators::FuzzyRules> rules, const FuzzyQLearningConfig& config,
                  std::uint64_t seed)
       : config_(config) {
@@ -92,9 +91,8 @@ class FuzzyQLearning {
   }
   std::size_t n_environments() const noexcept { return dimensions_.front().n_environments(); }
 
-  /// Begins an episode: resets its number of steps and its traces. The caller must call it, since
-  /// learning a terminated transition only resets the traces. Throws std::invalid_argument if the
-  /// environment does not exist.
+  /// Begins an episode: resets its number of steps and its traces. Learning a terminated transition
+  /// only resets the traces. Throws std::invalid_argument if the environment does not exist.
   void begin_episode(std::size_t environment = 0) {
     for (auto& dimension : dimensions_) dimension.begin_episode(environment);
   }
@@ -165,14 +163,13 @@ class FuzzyQLearning {
     return workspace.action;
   }
 
-  /// The two steps of a greedy act: `read` finds the rules that fire, in any thread; `best_of`
-  /// returns the action in the state that was read last.
+  /// Finds the rules that fire in a state: the first step of a greedy act, in any thread.
   void read(std::span<const double> state, Workspace& workspace) const {
     for (std::size_t d = 0; d < n_dimensions(); ++d) {
       dimensions_[d].rules().fire(state, workspace.fired[d]);
     }
   }
-  /// The greedy action in the state that was read into the workspace.
+  /// Returns the greedy action in the state that was read last: the second step of a greedy act.
   Action best_of(Workspace& workspace, ActionMask /*mask*/ = {}) {
     for (std::size_t d = 0; d < n_dimensions(); ++d) {
       workspace.action[d] =

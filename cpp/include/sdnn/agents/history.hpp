@@ -19,10 +19,10 @@ namespace sdnn::agents {
 /// Makes states from the inputs of the present and earlier observations; all are in [0, 1].
 ///
 /// With `automatic`, an observer's estimates replace the inputs if they reduce squared prediction
-/// errors by an eighth, as with noisy sensors. Otherwise differences are added if they explain a
-/// further 20 % of an input's changes and leave less than 30 %, as without observed velocities.
-/// Symbols have no history. There is no history if the experience is too small or there are too
-/// many inputs.
+/// errors by an eighth, which shows noisy sensors. Otherwise differences are added if they explain
+/// 20 % of the changes of an input beyond what the present state explains, and leave less than 30 %
+/// unexplained, which shows velocities that are not observed. Symbols have no history. There is no
+/// automatic history if the experience is too small or there are too many inputs.
 class HistoryFilter {
  public:
   /// Makes a filter without any history, for observations of `n` inputs.
@@ -33,19 +33,11 @@ class HistoryFilter {
       : circular_(experience.circular),
         n_symbols_(std::move(n_symbols)),
         n_dimensions_(n_dimensions) {
-    const RandomExperience numbers = numbers_of(experience);
-    const bool fits_observer = numbers.n_inputs > 0 &&
-                               numbers.n_inputs <= detail::Observer::kMostInputs &&
-                               numbers.size() >= detail::Observer::kFewestTransitions;
-    kind_ = history == History::automatic ? History::none : history;
-    if (fits_observer && (history == History::automatic || history == History::observer)) {
-      observer_ = detail::Observer(numbers);
-      if (history == History::automatic) kind_ = found_kind(numbers);
-    } else if (history == History::observer) {
-      kind_ = History::none;
+    if (history == History::automatic || history == History::observer) {
+      fit_observer(history, numbers_of(experience));
+    } else {
+      kind_ = history;
     }
-    if (kind_ == History::observer) observer_.refine(numbers);
-    if (kind_ != History::observer) observer_ = {};
     if (kind_ == History::differences) find_largest_differences(experience);
   }
 
@@ -81,13 +73,12 @@ class HistoryFilter {
   }
 
   History kind() const noexcept { return kind_; }
-  /// Whether states are the inputs of single observations.
+  /// Whether states are the inputs of the present observation alone.
   bool is_none() const noexcept { return kind_ == History::none; }
-  /// The number of inputs of an observation; below, that of a state.
+  /// The number of inputs of an observation.
   std::size_t n_observed() const noexcept { return circular_.size(); }
-  std::size_t n_inputs() const {
-    return n_observed() + n_added() * static_cast<std::size_t>(n_numbers());
-  }
+  /// The number of inputs of a state.
+  std::size_t n_inputs() const { return n_observed() + n_added() * n_numbers(); }
   /// Which inputs of states are angles, and how many symbols each may be. Shapes: (n_inputs,).
   std::vector<bool> circular() const {
     return extended<bool>(
@@ -96,10 +87,11 @@ class HistoryFilter {
   std::vector<int> n_symbols() const {
     return extended<int>(n_symbols_, [](std::size_t) { return 0; });
   }
-  /// How far an observer's first estimate moves by its own error, or 1.
+  /// Observer::gain, or 1 without an observer.
   double gain() const noexcept { return observer_.gain(); }
 
-  /// The part of an episode that is remembered; empty before its first observation.
+  /// The remembered part of an episode: its last inputs, averages or estimates. Empty before the
+  /// episode's first observation, and without a history.
   using Memory = std::vector<double>;
   /// Memory in which the next step of an episode is computed.
   struct Room {
@@ -137,11 +129,13 @@ class HistoryFilter {
       find_numbers(inputs, room.numbers);
       observer_.follow(action, room.numbers, memory, room.features);
     }
-    for (std::size_t k = 0; kind_ == History::averages && k < memory.size(); ++k) {
-      const std::size_t i = k % n_observed();
-      const double rate = k < n_observed() ? kFastRate : kSlowRate;
-      const double average = memory[k] + rate * difference(inputs[i], memory[k], i);
-      memory[k] = circular_[i] ? average - std::floor(average) : average;
+    if (kind_ == History::averages) {  // the fast averages of all inputs, then the slow ones
+      for (std::size_t k = 0; k < memory.size(); ++k) {
+        const std::size_t i = k % n_observed();
+        const double rate = k < n_observed() ? kFastRate : kSlowRate;
+        const double average = memory[k] + rate * difference(inputs[i], memory[k], i);
+        memory[k] = circular_[i] ? average - std::floor(average) : average;
+      }
     }
     find_state(inputs, room.last, memory, state, room);
   }
@@ -173,7 +167,8 @@ class HistoryFilter {
       follow(action, row(experience.next_states), memory, state, room);
       append(states.next_states);
     }
-    std::vector<std::size_t> origins;
+    std::vector<std::size_t>
+        origins;  // for each input of states, the observation's input it is from
     for (std::size_t k = 0; k <= n_added(); ++k) {
       for (std::size_t i = 0; i < n_observed(); ++i) {
         if (k == 0 || is_number(i)) origins.push_back(i);
@@ -188,13 +183,13 @@ class HistoryFilter {
     return kept;
   }
 
-  /// Whether a memory that was read can be continued.
+  /// Whether a memory that was read from a file has the right size and finite numbers.
   bool fits(const Memory& memory) const {
-    const std::size_t n = kind_ == History::averages   ? 2 * n_observed()
-                          : kind_ == History::observer ? observer_.n_inputs()
-                                                       : n_observed();
-    return (is_none() && memory.empty()) ||
-           (!is_none() && memory.size() == n && core::are_finite(memory));
+    if (is_none()) return memory.empty();
+    std::size_t n = n_observed();
+    if (kind_ == History::averages) n = 2 * n_observed();
+    if (kind_ == History::observer) n = observer_.n_inputs();
+    return memory.size() == n && core::are_finite(memory);
   }
 
   /// Lists the kind separately from `serialize`, because other parts of a state need it first.
@@ -208,8 +203,7 @@ class HistoryFilter {
       kind = static_cast<History>(number);
     }
   }
-  /// Lists the fitted members that are saved; see core/state.hpp. They are restored into a filter
-  /// of the same kind and inputs.
+  /// Lists the fitted members; see core/state.hpp. A filter of the same kind and inputs reads them.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     if constexpr (Archive::kReads) {
@@ -232,16 +226,19 @@ class HistoryFilter {
   }
 
  private:
-  static constexpr double kLeastImprovement = 0.1335;        // of the observer: log(8 / 7)
-  static constexpr double kLeastShare = 0.2;                 // of changes, explained by differences
+  static constexpr double kLeastImprovement =
+      0.1335;                                 // of logarithms of squared errors: log(8 / 7)
+  static constexpr double kLeastShare = 0.2;  // of changes, explained by differences
   static constexpr double kFastRate = 0.5, kSlowRate = 0.2;  // of the two running averages
   static constexpr double kHeadroom = 1.5;          // of the largest difference in the experience
   static constexpr double kLeastDifference = 1e-9;  // not 0, as differences are divided by it
 
+  /// Whether an input of observations is no symbol.
   bool is_number(std::size_t i) const noexcept { return n_symbols_[i] == 0; }
   std::size_t n_numbers() const {
     return static_cast<std::size_t>(std::ranges::count(n_symbols_, 0));
   }
+  /// The number of inputs that a state has for each number beside the number itself.
   std::size_t n_added() const noexcept {
     return kind_ == History::differences ? 1 : kind_ == History::averages ? 2 : 0;
   }
@@ -258,11 +255,6 @@ class HistoryFilter {
     return all;
   }
 
-  std::vector<double> numbers_in(std::span<const double> inputs) const {
-    std::vector<double> numbers;
-    find_numbers(inputs, numbers);
-    return numbers;
-  }
   /// Writes the inputs that are not symbols, of one row or of several.
   void find_numbers(std::span<const double> inputs, std::vector<double>& numbers) const {
     numbers.clear();
@@ -277,18 +269,30 @@ class HistoryFilter {
       if (is_number(i)) experience.circular.push_back(circular_[i]);
     }
     experience.n_inputs = experience.circular.size();
-    experience.states = numbers_in(experience.states);
-    experience.next_states = numbers_in(experience.next_states);
+    for (std::vector<double>* const rows : {&experience.states, &experience.next_states}) {
+      const std::vector<double> inputs = std::exchange(*rows, {});
+      find_numbers(inputs, *rows);
+    }
     return experience;
   }
 
-  /// Selects the history that the random experience needs: against noise, of velocities, or none.
-  History found_kind(const RandomExperience& numbers) const {
-    if (observer_.gain() < 1.0 && observer_.improvement() >= kLeastImprovement) {
-      return History::observer;
+  /// Fits an observer, unless the experience is too small or there are too many numbers, and uses
+  /// it if `history` is observer. With `automatic`, selects what the experience needs: an observer
+  /// against noise, differences for velocities, or nothing.
+  void fit_observer(History history, const RandomExperience& numbers) {
+    if (numbers.n_inputs == 0 || numbers.n_inputs > detail::Observer::kMostInputs ||
+        numbers.size() < detail::Observer::kFewestTransitions) {
+      return;
     }
-    return observer_.share_of_last_changes(numbers) >= kLeastShare ? History::differences
-                                                                   : History::none;
+    detail::Observer observer(numbers);
+    if (history == History::observer ||
+        (observer.gain() < 1.0 && observer.improvement() >= kLeastImprovement)) {
+      kind_ = History::observer;
+      observer_ = std::move(observer);
+      observer_.refine(numbers);
+    } else if (observer.share_of_last_changes(numbers) >= kLeastShare) {
+      kind_ = History::differences;
+    }
   }
 
   /// The first value minus the second; of angles the shorter way.
@@ -296,7 +300,8 @@ class HistoryFilter {
     const double change = first - second;
     return circular_[i] ? change - std::round(change) : change;
   }
-  /// Finds the differences that states encode as 1: kHeadroom times the largest in the experience.
+  /// Sets the difference of each input that states encode as 1: kHeadroom times the largest one in
+  /// the experience. States encode its negative as 0.
   void find_largest_differences(const RandomExperience& experience) {
     largest_.assign(n_observed(), kLeastDifference);
     for (std::size_t k = 0; k < experience.states.size(); ++k) {
@@ -306,8 +311,8 @@ class HistoryFilter {
     }
   }
 
-  /// Writes a state: the inputs, then differences or averages of numbers; an observer's estimates
-  /// replace the numbers. All entries are in [0, 1].
+  /// Writes a state: the inputs, then differences from the `last` inputs, or averages, of numbers.
+  /// An observer's estimates replace the numbers. All entries are in [0, 1].
   void find_state(std::span<const double> inputs, std::span<const double> last,
                   const Memory& memory, std::span<double> state, Room& room) const {
     const auto clipped = [](double x) { return std::clamp(x, 0.0, 1.0); };
@@ -336,7 +341,7 @@ class HistoryFilter {
   std::vector<int> n_symbols_;
   [[maybe_unused]] std::size_t n_dimensions_ = 0;  ///< of actions
   History kind_ = History::none;
-  std::vector<double> largest_ = {};  ///< differences that a state encodes as 1
+  std::vector<double> largest_ = {};  ///< the difference of each input that states encode as 1
   detail::Observer observer_ = {};
 };
 

@@ -35,9 +35,9 @@ class LastReadings {
   /// Whether missing readings are replaced by the last ones.
   bool is_held() const noexcept { return is_held_; }
 
-  /// Returns an observation whose missing readings are replaced by the last ones, or stay NaN
-  /// without a last one. The result is in `room`. An observation of a wrong size is returned
-  /// unchanged. Shape: (n_variables,).
+  /// Returns the observation with the last readings in the place of missing ones, which become NaN
+  /// if there is no last reading. The result is in `room`. The observation itself is returned if
+  /// nothing is held, or its size is wrong, which callers check later. Shape: (n_variables,).
   std::span<const double> filled(std::span<const double> observation, std::size_t environment,
                                  bool is_greedy, std::vector<double>& room) const {
     return filled(observation, readings(environment, is_greedy), room);
@@ -49,8 +49,7 @@ class LastReadings {
     return {before, filled(next_observation, before, next_held_)};
   }
 
-  /// Stores the last result of `filled`: an observation in `room`, or (note_step) the next one of a
-  /// transition.
+  /// Stores what `filled` wrote into `room`; note_step, the transition's next observation.
   void note(const std::vector<double>& room, std::size_t environment, bool is_greedy) {
     if (!is_held_) return;
     if (last_.size() <= environment) last_.resize(environment + 1);
@@ -78,8 +77,9 @@ class LastReadings {
   }
 
  private:
+  /// The last readings in an environment's learned episode and in greedy ones; empty: none.
   struct Environment {
-    std::vector<double> learned, greedy;  ///< empty: none
+    std::vector<double> learned, greedy;
   };
 
   static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
@@ -90,8 +90,8 @@ class LastReadings {
     return is_greedy && !last.greedy.empty() ? last.greedy : last.learned;
   }
 
-  /// Returns the observation with the last readings in the place of missing ones, in `room`; of a
-  /// symbol all of its variables are replaced. Without hold it is returned unchanged.
+  /// Returns the observation with the readings `last` in the place of missing ones. If a variable
+  /// of a symbol is missing, all of its variables are replaced.
   std::span<const double> filled(std::span<const double> observation, std::span<const double> last,
                                  std::vector<double>& room) const {
     if (!is_held_ || observation.size() != n_variables_) return observation;
@@ -111,6 +111,7 @@ class LastReadings {
     return room;
   }
 
+  /// Lists the readings of all environments that have some, and the numbers of these environments.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive, const std::string& name,
                         std::vector<double> Environment::* member) {
@@ -130,7 +131,7 @@ class LastReadings {
       for (Environment& environment : self.last_) (environment.*member).clear();
       for (std::size_t k = 0; k < environments.size(); ++k) {
         const auto i = static_cast<std::size_t>(environments[k]);
-        archive.expect(environments[k] >= 0 && i < Episodes<int>::kMost, name,
+        archive.expect(environments[k] >= 0 && i < kMostEnvironments, name,
                        "of numbers of environments");
         if (self.last_.size() <= i) self.last_.resize(i + 1);
         const auto first = values.begin() + static_cast<std::ptrdiff_t>(k * n);

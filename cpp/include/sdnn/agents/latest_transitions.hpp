@@ -1,4 +1,4 @@
-/// The latest transitions at some times, to test again which inputs are relevant.
+/// The latest transitions of an agent, to test again which inputs are relevant.
 #pragma once
 
 #include <cstddef>
@@ -9,11 +9,11 @@
 
 namespace sdnn::agents {
 
-/// Remembers the last n transitions before transition number 2 n, 4 n, 8 n and so on; n = n_steps.
+/// Remembers the last n transitions before transition number 2 n, 4 n, 8 n and so on, where n is
+/// the length of the warm-up, n_steps. Between these times it is empty.
 class LatestTransitions {
  public:
-  /// `empty` has room for n_steps transitions. The first n_steps of all count as seen: the agent
-  /// was warming up.
+  /// `empty` is a store without transitions. Those of the warm-up, n_steps, count already.
   LatestTransitions(WarmUp empty, std::size_t n_steps)
       : empty_(std::move(empty)), latest_(empty_), n_steps_(n_steps), n_seen_(n_steps) {}
 
@@ -23,7 +23,7 @@ class LatestTransitions {
   }
   void begin_episode(std::size_t environment) { latest_.begin_episode(environment); }
 
-  /// Counts a transition, and stores it if it is one of the n_steps before the next of these times.
+  /// Counts a transition, and stores it if it is one of the n_steps before the next of the times.
   /// Returns whether all n_steps are stored; the caller then tests them and calls `forget`.
   bool learn(const WarmUp::Step& step) {
     const bool is_noted = n_seen_ >= next_time() - n_steps_;

@@ -56,8 +56,8 @@ class NStepBuffer {
     ++n_steps_;
   }
 
-  /// The return of the oldest step: all rewards since, discounted by `discount` for each usual step
-  /// of time, then `value`.
+  /// Returns r_1 + gamma r_2 + ... + gamma^n value for the rewards of all n steps, where gamma is
+  /// `discount`, raised to the duration of each step.
   double return_of_oldest(double value, double discount) const noexcept {
     for (std::size_t i = n_steps_; i-- > 0;) {
       const Step& step = steps_[(first_ + i) % steps_.size()];
@@ -109,12 +109,11 @@ class NStepBuffer {
       archive.expect(n <= self.steps_.size(), "rewards", "no more than n_steps");
       archive.expect(states.size() == n * n_inputs, "states", "n_inputs per reward");
       archive.expect(actions.size() == n * n_dimensions, "actions", "those of every reward");
-      const auto is_unit = [](double x) { return x >= 0.0 && x <= 1.0; };
       const auto is_index = [](std::int64_t a) { return std::in_range<std::size_t>(a); };
       archive.expect(std::ranges::all_of(actions, is_index), "actions", "of actions");
       archive.expect(core::are_finite(rewards), "rewards", "finite");
-      archive.expect(std::ranges::all_of(states, is_unit), "states", "in [0, 1]");
-      archive.expect(std::ranges::all_of(self.next_state_, is_unit), "next_state", "in [0, 1]");
+      archive.expect(core::are_unit_values(states), "states", "in [0, 1]");
+      archive.expect(core::are_unit_values(self.next_state_), "next_state", "in [0, 1]");
       self.first_ = 0;
       self.n_steps_ = n;
       for (std::size_t i = 0; i < n; ++i) {
@@ -130,10 +129,10 @@ class NStepBuffer {
   }
 
  private:
-  std::vector<Step> steps_;
+  std::vector<Step> steps_;  ///< a ring: step i, from the oldest, is at (first_ + i) % size
   std::size_t first_ = 0;
   std::size_t n_steps_ = 0;
-  std::vector<double> next_state_;
+  std::vector<double> next_state_;  ///< after the newest step
 };
 
 }  // namespace sdnn::agents

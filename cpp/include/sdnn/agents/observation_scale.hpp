@@ -48,13 +48,11 @@ struct ObservedInput {
 ///
 /// With Missing::hold a missing variable gets the middle of its range, and a symbol with a missing
 /// variable becomes the first symbol. With Missing::code an input with n bins has an additional bin
-/// for missing readings, and values are the middles of the n + 1 bins; an input is missing if one
-/// of its variables is.
+/// for missing readings, and values are middles of bins; one missing variable makes it missing.
 class ObservationScale {
  public:
-  /// Takes the ranges of the variables, and how inputs are made of them. Shapes: low and high
-  /// (n_observed,), n_bins (n_inputs,) with Missing::code. Throws std::invalid_argument naming what
-  /// does not fit.
+  /// Takes the ranges of variables, and the inputs that are made of them. Shapes: low and high
+  /// (n_observed,), n_bins (n_inputs,) with Missing::code. Throws std::invalid_argument.
   ObservationScale(std::vector<double> low, std::vector<double> high,
                    std::vector<ObservedInput> inputs, Missing missing = Missing::error,
                    std::vector<std::size_t> n_bins = {})
@@ -86,8 +84,7 @@ class ObservationScale {
 
   /// Writes the state of an observation. Shapes: observation (n_observed,), state (n_inputs,). With
   /// `is_wide` variables are clipped to [-1, 2] instead of [0, 1]. Throws std::invalid_argument
-  /// naming the unusable number of the observation, which messages call `name`: with Missing::error
-  /// all must be finite.
+  /// naming the unusable number of the observation, which messages call `name`; see Missing.
   void operator()(std::span<const double> observation, std::span<double> state,
                   const char* name = "observation", bool is_wide = false) const {
     core::require_size(name, observation.size(), n_observed(), "numbers");

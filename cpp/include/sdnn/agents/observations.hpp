@@ -14,7 +14,6 @@
 #include <utility>
 #include <vector>
 
-#include "sdnn/agents/detail/circles.hpp"
 #include "sdnn/agents/last_readings.hpp"
 #include "sdnn/agents/observation_config.hpp"
 #include "sdnn/agents/observation_scale.hpp"
@@ -26,21 +25,23 @@ namespace sdnn::agents {
 
 /// Scales observations to states in [0, 1]; see ObservationScale.
 ///
-/// The range of a variable is fixed, or fitted to observations: from the lowest to the highest,
-/// plus a quarter of the width at each end. Adaptive ranges leave out a twentieth of the
-/// observations at each end and stay within the fixed range. Narrowed ranges are fitted if the
-/// fixed range is more than twice as wide and there are few inputs; with many inputs, finer bins
-/// would get too little data. Running ranges (RunningRanges) change with each observation. Pairs of
-/// neighbouring variables that move on the unit circle, apart from noise, can be detected as
-/// angles.
+/// The range of a variable is fixed by the configuration, or fitted to observations: from the
+/// lowest to the highest, plus a quarter of the width at each end. Three settings change this:
+/// - `adaptive`: all ranges are fitted, without the lowest and the highest twentieth of the
+///   observations, and stay within the fixed range.
+/// - `narrowed`: a fixed range is replaced by the fitted one if it is more than twice as wide. Only
+///   with few inputs: with many, the finer bins would get too little data.
+/// - `running`: ranges change with each observation; see RunningRanges.
+///
+/// Neighbouring variables that move on the unit circle, apart from noise, can become angles.
 class Observations {
  public:
-  static constexpr double kHeadroom = 0.25;
+  static constexpr double kHeadroom = 0.25;  ///< of fitted ranges at each end, in widths
 
-  /// Symbols are separate inputs if the approximator codes symbols. The last input is repeated if
-  /// there are fewer than `least_inputs`. With Missing::code, `n_bins` has the number of bins of
-  /// each input that is not a symbol, or one number for all. Throws std::invalid_argument naming
-  /// the impossible field.
+  /// With `codes_symbols` a symbol, which is a one-hot vector of variables, is one input; otherwise
+  /// each of its variables is. The last input is repeated if there are fewer than `least_inputs`.
+  /// With Missing::code, `n_bins` has the number of bins of each input, or a single number for all
+  /// inputs that are no symbols. Throws std::invalid_argument naming the impossible field.
   Observations(ObservationConfig config, bool codes_symbols, std::size_t least_inputs,
                std::vector<std::size_t> n_bins = {})
       : config_(std::move(config)), least_inputs_(least_inputs), n_bins_(std::move(n_bins)) {
@@ -70,13 +71,13 @@ class Observations {
     const Ranges fixed = fixed_ranges(config_.angle_pairs);
     needs_fit_ = may_find_pairs() || may_leave_out_inputs(config_.angle_pairs) ||
                  has_fixed_history() || std::ranges::any_of(fixed.low, is_unknown);
-    if (!needs_fit_) take(fixed, config_.angle_pairs);
+    if (!needs_fit_) set_ranges(fixed, config_.angle_pairs);
   }
 
   std::size_t n_variables() const noexcept { return config_.low.size(); }
-  /// Whether ranges or pairs follow from observations.
+  /// Whether observations of a warm-up are needed, for ranges, pairs, inputs or a history.
   bool needs_fit() const noexcept { return needs_fit_; }
-  /// Whether all ranges are known. Only then there are inputs and states.
+  /// Whether all ranges are known. Inputs and states exist only then.
   bool is_fitted() const noexcept { return scale_.has_value(); }
 
   /// Shapes: (n_variables,).
@@ -84,8 +85,7 @@ class Observations {
   std::span<const double> high() const noexcept { return ranges_.high; }
   std::span<const ObservedInput> inputs() const noexcept { return inputs_; }
   std::size_t n_inputs() const noexcept { return inputs_.size(); }
-  /// Whether inputs of little relevance may be left out. Where there are one or two inputs, all are
-  /// kept.
+  /// Whether irrelevant inputs may be left out. With one or two inputs, all are kept.
   bool has_choice() const { return may_leave_out_inputs(pairs_); }
   /// Which inputs are angles.
   std::vector<bool> circular() const {
@@ -95,17 +95,17 @@ class Observations {
     }
     return circular;
   }
-  /// Whether there is one input only, which may have to be given twice.
+  /// Whether there is a single possible input.
   bool has_single_input() const { return inputs_with(pairs_).size() == 1; }
-  /// Sets whether a single input is given as often as the approximator needs inputs, or once where
-  /// a HistoryFilter adds others. Requires that nothing was left out.
+  /// Sets whether a single input is repeated until the approximator has enough inputs. It is not
+  /// where a HistoryFilter adds others. Requires that no input was left out.
   void repeat_input(bool is_repeated) {
     repeats_input_ = is_repeated;
-    if (scale_) take_inputs(inputs_with(pairs_));
+    if (scale_) set_inputs(inputs_with(pairs_));
   }
-  /// Whether inputs may be fewer than variables that are no symbols.
+  /// Whether `fit` or `keep` may reduce the inputs: by pairs of an angle, or by leaving some out.
   bool may_have_fewer_inputs() const { return may_find_pairs() || config_.relevant_only; }
-  /// The number of symbols of each input; 0 for an input that is a number.
+  /// The number of symbols of each input, with one for missing readings if coded; 0 for a number.
   std::vector<int> n_symbols() const {
     std::vector<int> n_symbols;
     for (const ObservedInput& input : inputs_) {
@@ -114,14 +114,14 @@ class Observations {
     }
     return n_symbols;
   }
-  /// The last readings before any episode has begun: none.
+  /// A memory for the last readings, without any reading yet.
   LastReadings last_readings() const {
     return {config_.missing == Missing::hold, n_variables(), config_.symbols};
   }
   /// Whether each input has a pattern for missing readings; a symbol's is its last one.
   bool codes_missing() const noexcept { return config_.missing == Missing::code; }
 
-  /// The number of states if an observation is a single symbol; else 0.
+  /// The number of states if observations are a single symbol; 0 if they are not countable.
   std::size_t n_states() const noexcept {
     const bool is_symbol =
         !config_.symbols.empty() && index(config_.symbols.front()[1]) == n_variables();
@@ -129,9 +129,7 @@ class Observations {
     return codes_missing() ? n_variables() + 1 : n_variables();
   }
 
-  /// Writes the state of an observation. Shapes: observation (n_variables,), state (n_inputs,).
-  /// Throws std::invalid_argument naming the unusable number of the observation, which messages
-  /// call `name`. Requires fitted ranges.
+  /// Writes the state of an observation; see ObservationScale. Requires fitted ranges.
   void scale(std::span<const double> observation, std::span<double> state,
              const char* name = "observation", bool is_wide = false) const {
     (*scale_)(observation, state, name, is_wide);
@@ -139,16 +137,16 @@ class Observations {
 
   /// Whether ranges change.
   bool is_running() const noexcept { return running_.has_value(); }
-  /// Lets running ranges begin anew.
+  /// Resets running ranges to those before any observation.
   void forget() {
     if (running_) running_.emplace(n_variables());
   }
-  /// Lets running ranges follow an observation. Requires that it is fitted.
+  /// Updates running ranges by an observation. Requires that there are some, and fitted ranges.
   void note(std::span<const double> observation) {
     running_->note(observation);
-    follow();
+    use_running_ranges();
   }
-  /// Which inputs have a variable that is never left out.
+  /// Which inputs are never left out: those of variables that the configuration lists in `inputs`.
   std::vector<bool> required() const {
     std::vector<bool> required;
     for (const ObservedInput& input : inputs_) {
@@ -161,34 +159,36 @@ class Observations {
     return required;
   }
 
-  /// Throws std::invalid_argument unless these are readings of all variables.
+  /// Throws std::invalid_argument unless there is a value, usable by Missing, for each variable.
   void require_readings(const char* name, std::span<const double> values) const {
     core::require_size(name, values.size(), n_variables(), "numbers");
     if (config_.missing == Missing::error) ObservationScale::require_present(name, values);
   }
 
-  /// Fits unknown ranges and pairs to the observations, ignoring missing readings. Shape: (n,
-  /// n_variables), row by row: the first half are the observations before steps, the second half
-  /// those after them. Ranges are wider than the observations by `headroom` times their width on
-  /// each side. A variable without any reading is treated as always 0. Throws
-  /// std::invalid_argument, and changes nothing, if a range is impossible.
-  void fit(std::span<const double> seen, double headroom = kHeadroom);
+  /// Fits unknown ranges and pairs to `observations`, ignoring missing readings, and narrows ranges
+  /// that are much too wide. Shape: (n, n_variables), row by row: the first half are observations
+  /// before steps, the second half those after the same steps. Ranges are wider than the
+  /// observations by `headroom` times their width at each end. A variable without any reading
+  /// counts as 0. Throws std::invalid_argument, and changes nothing, for an impossible range.
+  void fit(std::span<const double> observations, double headroom = kHeadroom);
 
-  /// Keeps the inputs whose entry is true, and drops the others; a later call may add dropped
-  /// inputs at the end. Shape: an entry for each possible input. Requires fitted ranges, and that
-  /// an input is kept.
-  void keep(const std::vector<bool>& kept) {
-    const std::vector<bool> present = kept_inputs();
-    assert(kept.size() == present.size());
-    const bool is_first = kept_.empty();
-    for (std::size_t i = 0; i < kept.size(); ++i) {
-      if (kept[i] && (is_first || !present[i])) kept_.push_back(static_cast<std::int32_t>(i));
+  /// Keeps the inputs whose entry is true, and drops the others. A later call may add dropped
+  /// inputs, which become the last ones, but drops no further ones. Shape: an entry for each
+  /// possible input. Requires fitted ranges, and that an input is kept.
+  void keep(const std::vector<bool>& is_kept) {
+    const std::vector<bool> was_kept = kept_inputs();
+    assert(is_kept.size() == was_kept.size());
+    const bool is_first_call = kept_.empty();
+    for (std::size_t i = 0; i < is_kept.size(); ++i) {
+      if (is_kept[i] && (is_first_call || !was_kept[i])) {
+        kept_.push_back(static_cast<std::int32_t>(i));
+      }
     }
-    if (is_first) n_first_ = kept_.size();
+    if (is_first_call) n_first_ = kept_.size();
     const std::vector<ObservedInput> all = inputs_with(pairs_);
     std::vector<ObservedInput> inputs;
     for (const std::int32_t i : kept_) inputs.push_back(all[static_cast<std::size_t>(i)]);
-    take_inputs(std::move(inputs));
+    set_inputs(std::move(inputs));
   }
   /// Whether each of all possible inputs is kept.
   std::vector<bool> kept_inputs() const {
@@ -196,12 +196,12 @@ class Observations {
     for (const std::int32_t i : kept_) kept[static_cast<std::size_t>(i)] = true;
     return kept;
   }
-  /// How many inputs there were before the first one was added.
+  /// The number of inputs before any dropped one was added.
   std::size_t n_first_inputs() const noexcept { return kept_.empty() ? n_inputs() : n_first_; }
   /// A copy with all possible inputs.
   Observations with_all_inputs() const {
     Observations all = *this;
-    all.take(ranges_, pairs_);
+    all.set_ranges(ranges_, pairs_);
     return all;
   }
 
@@ -211,7 +211,7 @@ class Observations {
     if (self.running_) {
       archive.part("running", *self.running_);
       if constexpr (Archive::kReads) {
-        if (!self.needs_fit_) self.follow();
+        if (!self.needs_fit_) self.use_running_ranges();
       }
     }
     if (!self.needs_fit_) return;
@@ -236,9 +236,11 @@ class Observations {
                        "angle_pairs", "of variables");
         pairs.push_back({listed[k], listed[k + 1]});
       }
-      archive.taking("low", [&] { self.take(ranges, pairs); });
+      archive.naming("low", [&] { self.set_ranges(ranges, pairs); });
       archive.expect(n_first <= kept.size() && (n_first > 0 || kept.empty()), "n_first",
                      "as many as are kept, or fewer");
+      // `keep` receives the first n_first inputs together, then each added one, as when they were
+      // saved. So the inputs get the order of `kept`, unless it is impossible.
       std::vector<bool> is_kept(self.kept_inputs().size());
       for (std::size_t k = 0; k < kept.size(); ++k) {
         const auto i = static_cast<std::size_t>(kept[k]);
@@ -251,18 +253,20 @@ class Observations {
   }
 
  private:
+  /// The use of a variable: a number, a circular one, or a part of a symbol or of cosine and sine.
   enum class Role { number, symbol, circular, pair };
   struct Ranges {
     std::vector<double> low, high;  ///< NaN: not known
   };
   using Pairs = std::vector<std::vector<int>>;
 
-  static constexpr double kMuchWider = 2.0;  // ratio of widths from which ranges are narrowed
+  // Chosen constants.
+  static constexpr double kMuchWider = 2.0;  // ratio of widths above which ranges are narrowed
   static constexpr double kRounding = 1e-6;  // relative differences that single precision can cause
-  static constexpr std::size_t kFewInputs = 4;   // more inputs are not narrowed
-  static constexpr std::size_t kAlwaysKept = 2;  // inputs that are kept without a selection
-  static constexpr std::size_t kRare = 20;       // one in 20 observations at each end is rare
-  static constexpr double kLargest = 1e300;      // end of a range, so that its width is finite
+  static constexpr std::size_t kFewInputs = 4;   // with more inputs no range is narrowed
+  static constexpr std::size_t kAlwaysKept = 2;  // so few inputs are kept without a selection
+  static constexpr std::size_t kRare = 20;       // 1 in 20 observations at each end is rare
+  static constexpr double kLargest = 1e300;  // largest end of a range, so that widths are finite
 
   static bool is_unknown(double x) noexcept { return std::isnan(x); }
   bool is_variable(std::int64_t i) const noexcept {
@@ -286,8 +290,7 @@ class Observations {
     present = role;
   }
 
-  /// Returns the ranges that are known without a fit: by the configuration, running ones, and
-  /// [-1, 1] in pairs. Others are NaN.
+  /// Returns the ranges known without a fit: fixed, running, and [-1, 1] in pairs; others are NaN.
   Ranges fixed_ranges(const Pairs& pairs) const {
     const double unknown = std::numeric_limits<double>::quiet_NaN();
     Ranges ranges{std::vector<double>(n_variables(), unknown),
@@ -330,15 +333,15 @@ class Observations {
     });
   }
 
-  static void narrow(Ranges& ranges, std::size_t i, const std::vector<double>& seen,
+  Pairs pairs_in(std::span<const double> observations) const;
+  static void narrow(Ranges& ranges, std::size_t i, const std::vector<double>& values,
                      double headroom);
   static std::pair<double, double> widened(double low, double high, double headroom) noexcept;
-  /// Adaptive ranges leave out rare observations; a variable that hardly moves has its fixed range.
-  std::pair<double, double> fitted_range(std::vector<double> seen, std::size_t i,
+  std::pair<double, double> fitted_range(std::vector<double> values, std::size_t i,
                                          double headroom) const;
 
-  /// Scales by the running ranges as they are now.
-  void follow() {
+  /// Scales numbers by the running ranges as they are now.
+  void use_running_ranges() {
     for (std::size_t i = 0; i < n_variables(); ++i) {
       if (roles_[i] != Role::number || is_one_of(pairs_, i)) continue;
       std::tie(ranges_.low[i], ranges_.high[i]) = (*running_)[i];
@@ -346,6 +349,7 @@ class Observations {
     }
   }
 
+  /// Whether neighbouring numbers may turn out to be cosine and sine of an angle.
   bool may_find_pairs() const {
     const auto are_numbers = [](Role a, Role b) { return a == Role::number && b == a; };
     return config_.find_angle_pairs &&
@@ -359,24 +363,10 @@ class Observations {
     return config_.relevant_only && inputs_with(pairs).size() > kAlwaysKept;
   }
 
-  /// Finds neighbouring variables that are cosine and sine of an angle.
-  Pairs pairs_in(std::span<const double> seen) const {
-    Pairs pairs;
-    for (std::size_t i = 0; i + 1 < n_variables(); ++i) {
-      if (roles_[i] != Role::number || roles_[i + 1] != Role::number) continue;
-      const auto [cosines, sines] = detail::columns(seen, n_variables(), i, i + 1);
-      if (!detail::is_on_circle(cosines, sines) && !detail::is_around_circle(cosines, sines))
-        continue;
-      pairs.push_back({static_cast<int>(i), static_cast<int>(i + 1)});
-      ++i;
-    }
-    return pairs;
-  }
-
   /// Lists the inputs of states in the order of their first variables; each pair is an angle.
   std::vector<ObservedInput> inputs_with(const Pairs& pairs) const {
     std::vector<ObservedInput> of_variable(n_variables());
-    std::vector<bool> is_part(n_variables());
+    std::vector<bool> is_part(n_variables());  // of the input of an earlier variable
     for (std::size_t i = 0; i < n_variables(); ++i) {
       is_part[i] = roles_[i] == Role::symbol;
       const bool wraps = roles_[i] == Role::circular;
@@ -397,24 +387,27 @@ class Observations {
     return inputs;
   }
 
-  /// Replaces ranges and angle pairs, and the inputs that follow from them.
-  void take(const Ranges& ranges, const Pairs& pairs) {
+  /// Replaces ranges and angle pairs, and takes all inputs that follow from them. Throws
+  /// std::invalid_argument, and changes nothing, if a range is impossible.
+  void set_ranges(const Ranges& ranges, const Pairs& pairs) {
     ObservationScale(ranges.low, ranges.high, {});  // throws before anything changes
     ranges_ = ranges;
     pairs_ = pairs;
     kept_.clear();
     n_first_ = 0;
-    take_inputs(inputs_with(pairs));
+    set_inputs(inputs_with(pairs));
   }
 
   /// Replaces the inputs; the last is repeated if the approximator needs more of them.
-  void take_inputs(std::vector<ObservedInput> inputs) {
+  void set_inputs(std::vector<ObservedInput> inputs) {
     const std::size_t least = repeats_input_ ? least_inputs_ : 1;
     while (!inputs.empty() && inputs.size() < least) inputs.push_back(inputs.back());
     std::vector<std::size_t> n_bins;
-    for (std::size_t k = 0; k < inputs.size() && codes_missing(); ++k) {
-      const std::size_t of_number = n_bins_[std::min(k, n_bins_.size() - 1)];
-      n_bins.push_back(inputs[k].kind == ObservedKind::symbol ? inputs[k].second : of_number);
+    if (codes_missing()) {
+      for (std::size_t k = 0; k < inputs.size(); ++k) {
+        const std::size_t of_number = n_bins_[std::min(k, n_bins_.size() - 1)];
+        n_bins.push_back(inputs[k].kind == ObservedKind::symbol ? inputs[k].second : of_number);
+      }
     }
     scale_.emplace(ranges_.low, ranges_.high, inputs, config_.missing, std::move(n_bins));
     inputs_ = std::move(inputs);
@@ -424,14 +417,14 @@ class Observations {
   std::size_t least_inputs_;
   bool repeats_input_ = true;
   std::vector<std::size_t> n_bins_;
-  std::vector<Role> roles_;  ///< roles by the configuration
+  std::vector<Role> roles_;  ///< of each variable, by the configuration
   bool needs_fit_ = false;
   std::optional<RunningRanges> running_;
   Ranges ranges_;
   Pairs pairs_;
   std::vector<ObservedInput> inputs_;
-  std::vector<std::int32_t> kept_;  ///< numbers of the inputs that were kept, if some were not
-  std::size_t n_first_ = 0;         ///< the number of them before others were added
+  std::vector<std::int32_t> kept_;  ///< numbers of the inputs that `keep` kept; empty: all
+  std::size_t n_first_ = 0;         ///< how many of these its first call kept
   std::optional<ObservationScale> scale_;
 };
 

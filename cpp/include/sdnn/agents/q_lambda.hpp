@@ -7,14 +7,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <optional>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "sdnn/agents/action_mask.hpp"
-#include "sdnn/agents/detail/imitation.hpp"
 #include "sdnn/agents/detail/linear_td.hpp"
 #include "sdnn/agents/detail/q_lambda_episode.hpp"
 #include "sdnn/agents/duration.hpp"
@@ -60,8 +58,9 @@ class QLambda : public IndexAgent<QLambda> {
  public:
   using Readout = approximators::LinearSDNN;
 
-  /// The memory of one reader: the readout's workspace, the values of each dimension, and the best
-  /// action.
+  /// The memory in which a thread reads the agent.
+  ///
+  /// `values` are those of each dimension's actions; `action` is the best action.
   struct Workspace {
     Readout::Workspace readout;
     std::vector<std::vector<double>> values;
@@ -92,7 +91,7 @@ class QLambda : public IndexAgent<QLambda> {
   /// Transitions that were learned.
   std::int64_t n_learned() const noexcept { return n_learned_; }
 
-  /// Alpha at present, as epsilon in steps of 2^-16.
+  /// Alpha at present, a multiple of 2^-16 like epsilon.
   double learning_rate() const noexcept { return static_cast<double>(rate_) / kOne; }
   /// The value that epsilon approaches with schedule_steps, by default 0. With discrete states
   /// only, epsilon stays constant by default, so that every state continues to be explored: nothing
@@ -101,8 +100,8 @@ class QLambda : public IndexAgent<QLambda> {
     return config_.final_epsilon.value_or(has_symbols_only() ? config_.policy.epsilon : 0.0);
   }
 
-  /// Begins an episode: learns the pending transition of the last one, if it did not terminate, and
-  /// ends its trace. Throws std::invalid_argument if the environment does not exist.
+  /// Begins an episode. If the last one did not terminate, its trace ends, and with Sarsa its
+  /// pending transition is learned. Throws std::invalid_argument if the environment does not exist.
   void begin_episode(std::size_t environment = 0) {
     Episode& episode = episodes_.of(environment);
     episode.exploration.begin();
@@ -141,9 +140,9 @@ class QLambda : public IndexAgent<QLambda> {
     require_transition(state, action, reward, next_state, next_mask);
     require_duration(dt);
     Episode& episode = episodes_.of(environment);
-    const bool skips = std::exchange(episode.exploration.skips_learning, false) &&
-                       std::ranges::equal(action, episode.exploration.kept);
-    if (skips && !terminated) {
+    const bool is_of_excursion = std::exchange(episode.exploration.skips_learning, false) &&
+                                 std::ranges::equal(action, episode.exploration.kept);
+    if (is_of_excursion && !terminated) {
       end(episode);
       return;
     }
@@ -174,9 +173,9 @@ class QLambda : public IndexAgent<QLambda> {
 
   /// Learns that a teacher chose an action in a state, and that its return was `value`. The values
   /// of all actions move by the error of the action's value, so that errors of the returns do not
-  /// change the order of actions. If the best other action of a dimension is less than `margin`
-  /// below the teacher's, both move apart equally. Ends the episode of environment 0. Throws
-  /// std::invalid_argument for a bad state, value or margin.
+  /// change the order of actions. Then, in each dimension in which the best other action is less
+  /// than `margin` below the teacher's, both move apart by a tenth of the gap. Ends the episode of
+  /// environment 0. Throws std::invalid_argument for a bad state, value or margin.
   void imitate(std::span<const double> state, Action action, double value, double margin) {
     require_transition(state, action, value, state, {});
     core::require_in_range("margin", margin, std::numeric_limits<double>::min(), kLargestReward);
@@ -187,10 +186,9 @@ class QLambda : public IndexAgent<QLambda> {
     td_.fit_unit(margin, episodes_);
     ++n_learned_;
     apply_rates();
-    std::vector<std::int64_t> errors(readout().n_rows());
     const std::int64_t sum =
         td_.in_range(episodes_, [&] { return readout().sum(episode.present, action); });
-    std::ranges::fill(errors, readout().units_of(value) - sum);
+    std::vector<std::int64_t> errors(readout().n_rows(), readout().units_of(value) - sum);
     td_.move_rows(episode, episodes_, errors, rate_);
     detail::separate(readout(), episode.present, action, readout().units_of(margin), errors);
     td_.move_rows(episode, episodes_, errors, kSeparationRate);
@@ -201,23 +199,22 @@ class QLambda : public IndexAgent<QLambda> {
   bool has_acted(std::size_t environment) const {
     return episodes_.of(environment).exploration.step > 0;
   }
-  /// Notes that the last transition was read from a log and not made by the agent: such transitions
-  /// do not count in the length of the search for further rewards.
+  /// Notes that the transition learned last was read from a log, and not made by the agent. Such
+  /// transitions do not count in the length of the search after the first reward; see Exploration.
   void note_logged() noexcept {
     if (!readout().exponent()) ++n_logged_;
   }
 
-  /// Makes the unit of values smaller if it is larger than necessary; see LinearTD. The arguments
-  /// are sizes of RewardScale, that of the last window and the recent one.
+  /// Makes the unit of values smaller if it is larger than necessary; see LinearTD.
   void refine_unit(std::int32_t size_in_window, std::int32_t size) {
     td_.refine_unit(size_in_window, size, episodes_);
   }
 
-  /// Takes over the weights of an agent with fewer inputs; see LinearSDNN. In each environment the
-  /// pending transition is learned first, and the trace ends.
+  /// Takes over weights, rates and random numbers of an agent that lacks the last inputs of this
+  /// one; see LinearSDNN. Pending transitions are learned first, and traces end.
   void continue_from(QLambda fewer) {
-    for (std::size_t i = 0; i < fewer.n_environments(); ++i) {
-      if (fewer.episodes_.of(i).waits) fewer.finish_at_end(fewer.episodes_.of(i));
+    for (Episode& episode : fewer.episodes_) {
+      if (episode.waits) fewer.finish_at_end(episode);
     }
     td_.readout().continue_from(fewer.readout());
     exploration_ = std::move(fewer.exploration_);
@@ -238,9 +235,7 @@ class QLambda : public IndexAgent<QLambda> {
     Exploration::serialize(self.exploration_, archive);
     QLambda::serialize_rates(self, archive);
     archive.number("n_learned", self.n_learned_);
-    std::optional<std::int64_t> n_logged;  // none where all were steps of the agent
-    if (self.n_logged_ > 0) n_logged = self.n_logged_;
-    archive.number("n_logged", n_logged);
+    archive.number_unless("n_logged", self.n_logged_, 0);
     Episodes<Episode>::serialize(
         self.episodes_, archive, [&self] { return self.new_episode(); },
         [&](auto& episode) {
@@ -249,7 +244,6 @@ class QLambda : public IndexAgent<QLambda> {
     if constexpr (Archive::kReads) {
       archive.expect(self.n_learned_ >= 0 && self.n_learned_ <= kMostLearned, "n_learned",
                      "in [0, 2^45]");
-      self.n_logged_ = n_logged.value_or(0);
       archive.expect(self.n_logged_ >= 0 && self.n_logged_ <= self.n_learned_, "n_logged",
                      "in [0, n_learned]");
       self.apply_rates();
@@ -279,9 +273,10 @@ class QLambda : public IndexAgent<QLambda> {
   }
 
   static constexpr double kMostTolerance = 0x1p62;  ///< in units: above any difference of values
+  /// With more transitions, products in detail::scheduled could exceed 64 bits.
   static constexpr std::int64_t kMostLearned = std::int64_t{1} << 45;
-  static constexpr std::int32_t kOne = Readout::kRateOne;
-  static constexpr std::int32_t kSeparationRate = kOne / 10;
+  static constexpr std::int32_t kOne = Readout::kRateOne;     ///< units of rates in 1
+  static constexpr std::int32_t kSeparationRate = kOne / 10;  ///< of imitation (chosen)
 
   using Episode = detail::QLambdaEpisode;
 
@@ -298,8 +293,7 @@ class QLambda : public IndexAgent<QLambda> {
   }
 
   void apply_rates(const auto& /*change*/) { apply_rates(); }
-  /// Sets learning rate and epsilon: those that were set by hand, or by schedules of the steps
-  /// learned or of the progress.
+  /// Sets learning rate and epsilon: as callers set them, or by the steps learned or the progress.
   void apply_rates() {
     double rate = rates_.learning_rate(config_);
     double epsilon = rates_.epsilon(config_);
@@ -323,7 +317,7 @@ class QLambda : public IndexAgent<QLambda> {
     readout().read_next(state, episode.next);
     take_values(episode.next, workspace_.values, false);
   }
-  /// Writes values in units of the readout: integers, which are exact and in the same order.
+  /// Writes the values of all actions in the state that was read, in whole units of the readout.
   void take_values(Readout::Workspace& read, std::vector<std::vector<double>>& values,
                    bool averaged) const {
     for (std::size_t d = 0; d < n_dimensions(); ++d) {
@@ -331,14 +325,13 @@ class QLambda : public IndexAgent<QLambda> {
     }
   }
 
-  /// Returns a best allowed action in the state that was read last. The tolerance for ties is
-  /// rounded to whole units, as values are.
+  /// Returns a best allowed action in the state read last. The tolerance is rounded to whole units.
   Action best_of_read(Workspace& workspace, core::Random& ties, ActionMask mask) const {
     for (std::vector<double>& row : workspace.values) exclude(take_part(mask, row.size()), row);
     const EpsilonGreedy& policy = exploration_.policy();
     const double tolerance =
         std::ldexp(policy.config().tie_tolerance, -readout().exponent().value_or(0));
-    // Masked actions have a value of -infinity, with which they tie only at an infinite tolerance.
+    // Masked actions have the value -infinity. With a finite tolerance they never tie.
     const double whole = std::floor(std::min(tolerance, kMostTolerance));
     for (std::size_t d = 0; d < workspace.action.size(); ++d) {
       const std::span<const double> row = workspace.values[d];
@@ -348,7 +341,7 @@ class QLambda : public IndexAgent<QLambda> {
   }
 
   /// Returns the allowed action of the lowest value in the state that was read last, the first of
-  /// several.
+  /// several. Negates the values of the workspace, so that masked actions are not the lowest.
   Action worst_of_read(Workspace& workspace, ActionMask mask) const {
     for (std::size_t d = 0; d < workspace.action.size(); ++d) {
       std::vector<double>& row = workspace.values[d];
@@ -359,7 +352,8 @@ class QLambda : public IndexAgent<QLambda> {
     return workspace.action;
   }
 
-  /// Continues the episode: in the state of episode.next, `action` is taken.
+  /// Continues the episode by `action`, taken in the state of episode.next: learns the pending
+  /// transition of Sarsa, or ends the trace of Q-learning if the action is not a best one.
   void finish(Episode& episode, Action action) {
     if (config_.bootstrap == Bootstrap::q_learning) {
       const std::int64_t best = detail::best_sum(readout(), episode.next, episode.next_mask);
@@ -371,7 +365,7 @@ class QLambda : public IndexAgent<QLambda> {
     episode.waits = false;
   }
 
-  /// Ends an episode that has no terminal state.
+  /// Ends an episode that did not terminate.
   void finish_at_end(Episode& episode) {
     if (config_.bootstrap == Bootstrap::sarsa) correct_by_best(episode);
     end(episode);
@@ -393,7 +387,7 @@ class QLambda : public IndexAgent<QLambda> {
     episode.waits = false;
   }
 
-  /// Learns one step; `next` is Q' in units of the readout.
+  /// Learns the episode's last transition; `next` is Q' in units of the readout.
   void correct(Episode& episode, std::int64_t next) {
     const bool is_dutch = config_.traces == TraceKind::dutch && n_environments() == 1;
     const auto error =
@@ -405,7 +399,7 @@ class QLambda : public IndexAgent<QLambda> {
   detail::LinearTD<Episode> td_;
   Exploration exploration_;
   std::int64_t n_learned_ = 0;
-  std::int64_t n_logged_ = 0;  ///< of these, steps that the agent did not take; 0 after a reward
+  std::int64_t n_logged_ = 0;  ///< transitions from logs before the first reward; 0 after it
   std::int32_t rate_ = 0;      ///< alpha, in units of 1 / kOne
   Workspace workspace_;
   Episodes<Episode> episodes_;

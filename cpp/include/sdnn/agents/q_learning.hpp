@@ -259,8 +259,7 @@ class QLearning : public IndexAgent<QLearning<Q>> {
     return kHasRange && config_.value_range == ValueRange::adaptive;
   }
 
-  /// Returns the networks of all dimensions; throws std::invalid_argument unless they have the same
-  /// inputs.
+  /// Returns the networks. Throws std::invalid_argument without any, or if their inputs differ.
   static std::vector<Q> of_same_inputs(std::vector<Q> networks) {
     core::require(!networks.empty(), "networks", "at least one", networks.size());
     const std::size_t n = networks.front().n_inputs();
@@ -271,8 +270,7 @@ class QLearning : public IndexAgent<QLearning<Q>> {
   }
 
   /// Computes the values of all actions of dimension d, or only their firing counts if these have
-  /// the same order, into the workspace; `averaged` selects the average of the weights, if there is
-  /// one.
+  /// the same order, into the workspace; by the average of the weights if `averaged`.
   void read(std::span<const double> state, Workspace& workspace, std::size_t d,
             bool averaged) const {
     if constexpr (kCounts) {

@@ -1,4 +1,4 @@
-/// How observed variables use their ranges.
+/// How observed variables use their ranges, for warnings about ranges that do not fit.
 #pragma once
 
 #include <algorithm>
@@ -18,8 +18,8 @@ namespace sdnn::agents {
 
 /// The part of its range that an observed variable has recently used.
 struct RangeUse {
-  double share_used;    ///< the part of the range in which it was for nine tenths of the time
-  double share_beyond;  ///< how often it was outside the range
+  double share_used;    ///< the part of the range from the 5 % to the 95 % quantile of its values
+  double share_beyond;  ///< the share of its values that were outside the range
 };
 
 /// Notes about one in eight observations, and remembers about the last 256 notes.
@@ -69,18 +69,19 @@ class RangeNotes {
   }
 
  private:
-  static constexpr std::size_t kRare = 20;
-  static constexpr std::size_t kMostNoted = 256;
-  static constexpr std::size_t kMostValues = 1 << 20;
+  // Chosen constants.
+  static constexpr std::size_t kRare = 20;             // 1 in 20 values at each end is rare
+  static constexpr std::size_t kMostNoted = 256;       // notes that are remembered
+  static constexpr std::size_t kMostValues = 1 << 20;  // numbers in all notes, which limits memory
 
-  /// Random gaps, which avoid sampling in phase with the episodes.
+  /// Draws the observations to the next note; equal gaps could be in phase with episodes.
   std::uint32_t gap() noexcept { return 1 + gaps_.below(15); }
 
-  std::size_t n_variables_, most_;
+  std::size_t n_variables_, most_;  ///< most_: the number of notes that are remembered
   core::Pcg64 gaps_{std::array<std::uint64_t, 1>{0}};
   std::uint32_t n_until_noted_;
   std::vector<double> notes_;
-  std::size_t oldest_ = 0;
+  std::size_t oldest_ = 0;  ///< the number of the oldest note in a full list
 };
 
 }  // namespace sdnn::agents

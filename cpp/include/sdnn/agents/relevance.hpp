@@ -1,4 +1,4 @@
-/// Which inputs of a task have to do with its rewards or actions.
+/// The selection of the inputs that matter for a task's rewards or are changed by its actions.
 #pragma once
 
 #include <algorithm>
@@ -14,14 +14,14 @@
 
 namespace sdnn::agents {
 
-/// Transitions of random actions, in the order in which they came.
+/// Transitions of random actions in the order of time, one environment after the other.
 struct RandomExperience {
   std::size_t n_inputs = 0;
   std::vector<double> states = {};                ///< (n, n_inputs), in [0, 1]
   std::vector<double> next_states = {};           ///< (n, n_inputs), in [0, 1]
   std::vector<bool> circular = {};                ///< (n_inputs,): 0 and 1 are neighbours
   std::vector<double> rewards = {};               ///< (n,)
-  std::vector<bool> ends = {};                    ///< (n,): the next transition begins anew
+  std::vector<bool> ends = {};                    ///< (n,): another episode follows
   std::vector<std::vector<double>> actions = {};  ///< of each dimension, (n,)
 
   std::size_t size() const noexcept { return rewards.size(); }
@@ -38,23 +38,27 @@ struct RandomExperience {
 /// together if these rewards differ between pairs of their values more than between the values of
 /// each.
 ///
-/// A dependence is a large F statistic over eight bins of equal counts. It is compared with the
-/// statistics of the same two series with one of them shifted in time, by 40 different lengths: it
-/// must exceed 1.5 times the largest of these, for pairs of inputs twice. Shifts preserve the
-/// dynamics of each series, so slow noise, which seems to depend on everything, does so after
-/// shifts, too.
+/// A dependence is a large F statistic over eight bins of equal counts. It is compared with the F
+/// statistics of the same two series with one of them shifted in time, by 40 different lengths. It
+/// must be larger than 1.5 times the largest of these; for pairs of inputs, than twice the largest.
+/// Shifts preserve the dynamics of each series, so slow noise, which seems to depend on everything,
+/// does so after shifts, too.
 ///
-/// There are about n^2 comparisons of n inputs, so with many inputs some exceed that by chance.
-/// With more than 24 inputs the cube root of F, which is nearly normal, must also lie sqrt(2 log(10
-/// n^2)) standard deviations above its mean over the shifts, and rest on 8 values.
+/// There are about n^2 comparisons of n inputs, so with many inputs some dependences are found by
+/// chance. With more than 24 inputs evidence must therefore be *strict*: the cube root of F, which
+/// is nearly normal, must also lie sqrt(2 log(10 n^2)) standard deviations above its mean over the
+/// shifts, and rest on 8 values.
 ///
 /// Three binary inputs or more form groups (see detail::binary_groups). A group matters as a whole
-/// if one of its inputs does; since it has a chance with each of them, that needs the evidence
-/// above, also among few inputs. A one-hot vector matters, too, if actions decide which of its
+/// if one of its inputs does. Since each of them could do so by chance, the evidence must be
+/// strict, also with few inputs. A one-hot vector matters, too, if actions decide which of its
 /// inputs is on next.
+///
+/// The numbers are chosen constants.
 class Relevance {
  public:
-  /// `caution` multiplies the required evidence: above 1 for callers that repeat the selection.
+  /// `caution` multiplies the required evidence; callers that repeat the selection pass more
+  /// than 1. The experience must outlive this object.
   explicit Relevance(const RandomExperience& experience, double caution = 1.0)
       : experience_(experience), caution_(caution) {}
 
@@ -65,8 +69,8 @@ class Relevance {
     if (experience_.size() < kLeast) return std::vector<bool>(n_inputs, true);
     const Series series = all_series();
     std::vector<bool> matters(n_inputs);
-    std::vector<std::size_t> pending;  // changes that others may decide
-    const auto add = [&](std::size_t i) {
+    std::vector<std::size_t> pending;      // inputs that matter, whose causes are not searched yet
+    const auto add = [&](std::size_t i) {  // with its group
       const std::vector<std::size_t> alone{i};
       for (const std::size_t member : series.group_of[i].empty() ? alone : series.group_of[i]) {
         matters[member] = true;
@@ -81,12 +85,12 @@ class Relevance {
       if (!matters[group.inputs.front()] && are_steered(group, series)) add(group.inputs.front());
     }
     while (!pending.empty()) {
-      const std::size_t moved = pending.back();
+      const std::size_t effect = pending.back();
       pending.pop_back();
       for (std::size_t i = 0; i < n_inputs; ++i) {
         core::interruption_point();
-        const bool is_strict = series.is_strict(i) || series.is_strict(moved);
-        if (!matters[i] && depends(series.changes[moved], series.bins[i], is_strict)) add(i);
+        const bool is_strict = series.is_strict(i) || series.is_strict(effect);
+        if (!matters[i] && depends(series.changes[effect], series.bins[i], is_strict)) add(i);
       }
     }
     if (n_inputs <= kMostInPairs) {
@@ -102,30 +106,30 @@ class Relevance {
   }
 
  private:
-  static constexpr std::size_t kLeast = 100;             // transitions: fewer are no evidence
-  static constexpr std::size_t kMostWithoutChance = 24;  // inputs: more need more evidence
-  static constexpr std::size_t kLeastDeciding = 8;       // values that evidence rests on
-  static constexpr std::size_t kBins = 8;
-  static constexpr std::size_t kMostBins = 16;     // of a pair
-  static constexpr std::size_t kMostInPairs = 64;  // time grows as their square
-  static constexpr std::size_t kShifts = 40;
-  static constexpr std::size_t kRewards = 20;
-  static constexpr double kDiscount = 0.95;
-  static constexpr double kFactor = 1.5;
-  static constexpr double kFactorOfPairs = 2.0;  // of evidence: there are more pairs than inputs
+  static constexpr std::size_t kLeast = 100;             // transitions; fewer are no evidence
+  static constexpr std::size_t kMostWithoutChance = 24;  // inputs; with more, evidence is strict
+  static constexpr std::size_t kLeastDeciding = 8;       // values on which strict evidence rests
+  static constexpr std::size_t kBins = 8;                // of an input
+  static constexpr std::size_t kMostBins = 16;           // of a pair: four of each of its inputs
+  static constexpr std::size_t kMostInPairs = 64;        // inputs; the time grows as their square
+  static constexpr std::size_t kShifts = 40;             // in time, to show what chance gives
+  static constexpr std::size_t kRewards = 20;            // in a sum of the next rewards
+  static constexpr double kDiscount = 0.95;              // in such a sum
+  static constexpr double kFactor = 1.5;                 // of the largest F after shifts
+  static constexpr double kFactorOfPairs = 2.0;  // higher, as there are more pairs than inputs
 
   using Bins = std::vector<std::uint8_t>;
 
-  /// All that is compared, and which inputs belong together.
+  /// The series that are compared, of a number or bin for each transition, and groups of inputs.
   struct Series {
-    std::vector<Bins> bins = {};                    ///< of each input
-    std::vector<std::vector<double>> changes = {};  ///< of each input
-    std::vector<Bins> bins_of_actions = {};         ///< of each dimension
-    std::vector<std::vector<double>> outcomes = {};
+    std::vector<Bins> bins = {};                     ///< of the values of each input
+    std::vector<std::vector<double>> changes = {};   ///< of each input
+    std::vector<Bins> bins_of_actions = {};          ///< of each dimension
+    std::vector<std::vector<double>> outcomes = {};  ///< the next reward, sums of the next rewards
     std::vector<detail::BinaryGroup> groups = {};
-    std::vector<std::vector<std::size_t>> group_of = {};  ///< of each input; empty: it is alone
+    std::vector<std::vector<std::size_t>> group_of = {};  ///< of each input; empty: it has none
 
-    /// Whether dependences of an input need more evidence because there are many comparisons.
+    /// Whether dependences of an input need strict evidence.
     bool is_strict(std::size_t i) const {
       return bins.size() > kMostWithoutChance || !group_of[i].empty();
     }
@@ -222,9 +226,9 @@ class Relevance {
     return bins;
   }
 
-  /// Returns the F statistic: the variance between the means of bins divided by that within bins; 0
-  /// if nothing varies. Value t belongs to bin t + shift or, with `beside`, to the pair of this bin
-  /// and bin t of `beside`.
+  /// Returns the F statistic of values in bins: the variance between the means of the bins divided
+  /// by the variance within bins; 0 if nothing varies. Value t belongs to bins[t + shift], where
+  /// the end wraps around, or with `beside` to the pair of this bin and (*beside)[t].
   static double f_statistic(const std::vector<double>& values, const Bins& bins, std::size_t shift,
                             const Bins* beside) {
     double sums[kMostBins] = {}, counts[kMostBins] = {}, total = 0.0;
@@ -251,12 +255,13 @@ class Relevance {
     return between / (n_bins - 1.0) / (within / (static_cast<double>(n) - n_bins));
   }
 
-  /// Adds the inputs that matter together with another one.
+  /// Adds the inputs that matter together with another one. Inputs that matter `alone` are tested
+  /// with those that do not, and these with each other.
   void find_pairs(const std::vector<double>& outcomes, const Series& series,
                   const std::vector<bool>& alone, std::vector<bool>& matters) const {
     std::vector<Bins> bins = series.bins;
     for (Bins& of_input : bins) {
-      for (std::uint8_t& bin : of_input) bin /= 2;
+      for (std::uint8_t& bin : of_input) bin /= 2;  // four bins instead of eight
     }
     for (std::size_t i = 0; i < bins.size(); ++i) {
       const std::vector<double> beyond = without_means(outcomes, bins[i]);
@@ -270,7 +275,7 @@ class Relevance {
     }
   }
 
-  /// The rest of the values without the means of the bins.
+  /// Subtracts from each value the mean of the values in its bin.
   static std::vector<double> without_means(std::vector<double> values, const Bins& bins) {
     double sums[kMostBins] = {}, counts[kMostBins] = {};
     for (std::size_t t = 0; t < values.size(); ++t) {
@@ -288,8 +293,8 @@ class Relevance {
     return static_cast<double>(std::ranges::count(is_used, true));
   }
 
-  /// Counts the values on which a dependence rests: those that differ from the most frequent value
-  /// and are not in the fullest bin. If they are few, coincidences make any statistic large.
+  /// Counts the values on which a dependence rests: those that differ from the median and are not
+  /// in the fullest bin. If they are few, coincidences make any statistic large.
   static std::size_t n_deciding(const std::vector<double>& values, const Bins& bins) {
     std::size_t counts[kMostBins] = {};
     for (const std::uint8_t bin : bins) ++counts[bin];
@@ -304,7 +309,7 @@ class Relevance {
     return n;
   }
 
-  /// Whether the values differ between bins by more than chance, by more evidence if `is_strict`.
+  /// Whether values differ between bins, or between pairs of bins, by more than chance.
   bool depends(const std::vector<double>& values, const Bins& bins, bool is_strict,
                const Bins* beside = nullptr) const {
     const double factor = caution_ * (beside == nullptr ? kFactor : kFactorOfPairs);
@@ -323,7 +328,7 @@ class Relevance {
                       2.0 / (9.0 * (n_different(bins) - 1.0)));
   }
 
-  /// Whether actions decide which input of a one-hot vector is on next, given which one is.
+  /// Whether actions decide which input of a one-hot vector is on next, given the one that is on.
   bool are_steered(const detail::BinaryGroup& group, const Series& series) const {
     if (group.symbols.empty()) return false;
     return std::ranges::any_of(series.bins_of_actions, [&](const Bins& actions) {
@@ -338,9 +343,9 @@ class Relevance {
   }
 
   /// Returns whether a statistic is probably larger than all of n^2 normal numbers with the mean
-  /// and variance of the statistics `by_chance`. With a `least_variance` above 0 it is the cube
-  /// root of F, whose mean and variance are at least those for independent normal values, 1 -
-  /// least_variance and least_variance.
+  /// and variance of the statistics `by_chance`, for n inputs. With a `least_variance` v above 0
+  /// the statistics are cube roots of F. Their mean and variance count as at least 1 - v and v, as
+  /// for independent normal values.
   bool stands_out(double statistic, const std::vector<double>& by_chance,
                   double least_variance) const {
     double mean = 0.0, variance = 0.0;

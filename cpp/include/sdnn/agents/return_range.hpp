@@ -27,20 +27,20 @@ namespace sdnn::agents {
 /// the returns of all steps before it.
 ///
 /// Until 32 returns and a reward other than 0 are known, the range grows to contain the discounted
-/// sums of past rewards, z = r + gamma z: they have the same extremes as returns, and are known at
-/// once.
+/// sums of past rewards, z = r + gamma z: they have the extremes of returns, and are known at once.
 class ReturnRange {
  public:
-  /// The rewards of one environment.
+  /// The rewards of an environment whose returns are not known yet.
   struct Rewards {
-    std::vector<double> waiting;  ///< the first n are rewards whose returns are not known yet
+    std::vector<double> waiting;  ///< room for rewards, of which the first n are in use
     std::vector<double> dts;      ///< the durations of their transitions
     std::size_t n = 0;
-    double sum = 0.0;  ///< z
+    double sum = 0.0;  ///< z, the discounted sum of past rewards
   };
 
   explicit ReturnRange(double discount) : discount_(discount) { returns_.reserve(kMostReturns); }
 
+  /// The rewards of a new environment: none, and room for all that can wait.
   Rewards no_rewards() const {
     const std::size_t n = 2 * horizon();
     return {std::vector<double>(n), std::vector<double>(n, 1.0), 0, 0.0};
@@ -51,8 +51,8 @@ class ReturnRange {
   double low() const noexcept { return low_; }
   double high() const noexcept { return high_; }
 
-  /// Notes an environment's next reward, a finite one, of a transition of dt usual steps; returns
-  /// whether the range has moved.
+  /// Notes the next reward, finite, of a transition of dt usual steps; returns whether the range
+  /// moved.
   bool note(double reward, bool terminated, Rewards& rewards, double dt = 1.0) noexcept {
     rewards.sum = clipped(reward + discount_over(discount_, dt) * rewards.sum);
     const bool grows = (n_returns_ < kFewReturns || !is_known()) && hold(rewards.sum);
@@ -117,28 +117,29 @@ class ReturnRange {
   }
 
  private:
-  static constexpr std::size_t kMostReturns = 256;
-  static constexpr std::uint64_t kFewReturns = 32;
-  static constexpr std::uint64_t kReturnsPerLife = 2 * kMostReturns;
-  // The lowest of every 20 returns and the highest of every 50 are left out.
-  static constexpr std::size_t kLow = 20, kHigh = 50;
-  static constexpr double kHeadroom = 0.25;
+  // Chosen constants.
+  static constexpr std::size_t kMostReturns = 256;     // that are remembered
+  static constexpr std::uint64_t kFewReturns = 32;     // with fewer, sums of past rewards count
+  static constexpr std::size_t kLow = 20, kHigh = 50;  // 1 in 20 lowest and 50 highest is left out
+  static constexpr double kHeadroom = 0.25;            // of a range, in widths
   static constexpr double kLargest = 1e300;            // largest sum of rewards
   static constexpr double kFurthest = 2.0 * kLargest;  // beyond all ends of ranges of such sums
 
   static double clipped(double sum) noexcept { return std::clamp(sum, -kLargest, kLargest); }
   static bool is_sum(double number) noexcept { return number >= -kLargest && number <= kLargest; }
 
-  /// The number of returns from one that is remembered to the next one that is.
+  /// The number of returns from one that is remembered to the next: after n returns, n / 512, so
+  /// that the last 256 remembered ones are spread over the last half of all.
   static std::uint64_t returns_between(std::uint64_t n_returns) noexcept {
-    return std::max<std::uint64_t>(n_returns / kReturnsPerLife, 1);
+    return std::max<std::uint64_t>(n_returns / (2 * kMostReturns), 1);
   }
 
+  /// Steps after which a return counts as known: 2 / (1 - gamma), at most 500.
   std::size_t horizon() const noexcept {
     return static_cast<std::size_t>(2.0 / std::max(1.0 - discount_, 0.004));
   }
 
-  /// Widens the range to contain a sum, and by a quarter more, so that it is rarely widened.
+  /// Widens the range to contain a sum, and by a quarter more. Returns whether it had to.
   bool hold(double sum) noexcept {
     if (sum >= low_ && sum <= high_) return false;
     if (sum > high_) {
@@ -149,7 +150,9 @@ class ReturnRange {
     return true;
   }
 
-  /// Computes the returns of the first n_known rewards; with `are_all` the episode has no others.
+  /// Computes the returns of the first n_known rewards. With `are_all` the episode has no others;
+  /// otherwise the known rewards have the share 1 - missing of all weights, and their sum is
+  /// divided by it.
   void note_returns(const Rewards& rewards, std::size_t n_known, bool are_all) {
     const double width = n_returns_ < kFewReturns ? kLargest : high_ - low_;
     const double low = clipped(low_ - width), high = clipped(high_ + width);
@@ -162,7 +165,7 @@ class ReturnRange {
     }
   }
 
-  /// Counts a return, and remembers it if that is due, in the place of the oldest one.
+  /// Counts a return, and remembers it if it is due, once there are 256 in the place of the oldest.
   void note_return(double value) {
     if (++n_returns_ < due_) return;
     due_ = n_returns_ + returns_between(n_returns_);
@@ -174,8 +177,8 @@ class ReturnRange {
     }
   }
 
-  /// Sets the range by the remembered returns if it has to be wider, or may be half as wide;
-  /// returns whether it was changed.
+  /// Sets the range by the remembered returns if they are not within it, or it is twice as wide as
+  /// necessary. Returns whether it changed.
   bool follow() noexcept {
     if (n_returns_ < kFewReturns) return false;
     std::array<double, kMostReturns> sorted;
@@ -196,9 +199,9 @@ class ReturnRange {
   double low_ = 0.0;
   double high_ = 0.0;
   std::uint64_t n_returns_ = 0;
-  std::uint64_t due_ = 1;     ///< the next return that is remembered
-  std::uint64_t oldest_ = 0;  ///< of those remembered, once they are 256
-  std::vector<double> returns_;
+  std::uint64_t due_ = 1;        ///< the number of the next return to remember
+  std::uint64_t oldest_ = 0;     ///< the place of the oldest one in a full list
+  std::vector<double> returns_;  ///< those remembered
 };
 
 }  // namespace sdnn::agents

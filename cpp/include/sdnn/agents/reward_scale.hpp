@@ -1,4 +1,4 @@
-/// How large recent rewards are, and which of them are far too large to be learned.
+/// The size of recent rewards, and the refusal of rewards that are far too large.
 #pragma once
 
 #include <algorithm>
@@ -18,11 +18,11 @@ namespace sdnn::agents {
 /// would be rounded to 0.
 ///
 /// The size of a reward is the floor of its logarithm to base 2; the recent size is that of the
-/// largest recent reward. After each window of 1,024 rewards that are not all 0, a larger recent
-/// size falls: to at most 16 above the largest size in the window, and then by a quarter of the
-/// difference. A reward is refused if its size exceeds the recent one by more than the headroom.
-/// The headroom begins with 16. Each refusal adds 4, so that truly larger rewards are learned after
-/// some refusals, and every 64 windows subtract 1.
+/// largest recent reward. It falls after each window of 1,024 rewards that are not all 0: to at
+/// most 16 above the largest size in the window, then by a quarter of the difference to it. A
+/// reward is refused if its size exceeds the recent one by more than the headroom. The headroom
+/// begins with 16. Each refusal adds 4, so that truly larger rewards are learned after some
+/// refusals, and every 64 windows subtract 1. These numbers are chosen constants.
 class RewardScale {
  public:
   RewardScale() = default;

@@ -1,4 +1,4 @@
-/// Ranges of observed variables that follow what is observed.
+/// Ranges that follow the mean and the deviation of observed variables.
 #pragma once
 
 #include <algorithm>
@@ -35,7 +35,7 @@ class RunningRanges {
     }
   }
 
-  /// The lowest and the highest value of a variable, as it is now.
+  /// The ends of a variable's present range. Before its second observation, the deviation is 1.
   std::pair<double, double> operator[](std::size_t i) const noexcept {
     const double mean = means_[i];
     const double least = std::max(kRounding * std::abs(mean), kSmallest);
@@ -67,10 +67,11 @@ class RunningRanges {
 
  private:
   static constexpr double kDeviations = 2.5;
-  static constexpr double kRounding = 1e-6;  // relative, of single precision and some more
-  static constexpr double kSmallest = 1e-140;
-  static constexpr double kLargest = 1e140;  // its squares can be summed
-  static constexpr std::int64_t kMostNoted = std::int64_t{1} << 40;
+  static constexpr double kRounding = 1e-6;    // least deviation, relative to the mean
+  static constexpr double kSmallest = 1e-140;  // least deviation, so that ranges can be divided by
+  static constexpr double kLargest = 1e140;    // largest value, so that squares can be summed
+  static constexpr std::int64_t kMostNoted = std::int64_t{1}
+                                             << 40;  // a constant share from then on
 
   std::vector<std::int64_t> counts_;
   std::vector<double> means_;

@@ -1,5 +1,4 @@
-/// Settings that are scheduled over a training, for every configuration that has a learning rate
-/// and epsilon.
+/// Schedules of learning rate and epsilon, for all configurations that have these.
 #pragma once
 
 #include <algorithm>
@@ -16,8 +15,8 @@ namespace sdnn::agents {
 
 /// How alpha and epsilon go from their first to their final values.
 enum class Schedule {
-  linear,       ///< in a straight line
-  exponential,  ///< by the same factor in equal parts of the progress; no end may be 0
+  linear,       ///< by the same difference in equal parts of the progress
+  exponential,  ///< by the same factor in equal parts of the progress; no final value may be 0
 };
 constexpr std::array<std::string_view, 2> words_of(Schedule) noexcept {
   return {"linear", "exponential"};
@@ -86,8 +85,7 @@ bool follows_progress(const Config& config) noexcept {
 
 }  // namespace detail
 
-/// Returns alpha or epsilon at a progress in [0, 1]; without a schedule, the initial value. Epsilon
-/// is 0 if the policy is not epsilon-greedy.
+/// Alpha at a progress in [0, 1]; the first value if it does not follow the progress.
 template <class Config>
 double learning_rate_at(const Config& config, double progress) noexcept {
   if constexpr (requires { config.schedule; }) {
@@ -98,7 +96,7 @@ double learning_rate_at(const Config& config, double progress) noexcept {
   }
   return config.learning_rate;
 }
-/// Epsilon at a progress in [0, 1]; 0 for agents without epsilon.
+/// Epsilon at a progress in [0, 1]; the first value if it does not follow it; 0 without epsilon.
 template <class Config>
 double epsilon_at(const Config& config, double progress) noexcept {
   if constexpr (requires { config.policy; }) {
@@ -110,7 +108,7 @@ double epsilon_at(const Config& config, double progress) noexcept {
   }
 }
 
-/// Throws std::invalid_argument naming the field that is out of range or would have no effect.
+/// Returns the configuration. Throws std::invalid_argument naming a field out of range or useless.
 template <class Config>
 Config checked_schedule(const Config& config) {
   core::check_fields(config);
@@ -128,7 +126,7 @@ Config checked_schedule(const Config& config) {
   return config;
 }
 
-/// Alpha and epsilon follow the progress, unless they were set.
+/// The progress of an agent, and alpha and epsilon if callers have set them, against the schedule.
 struct Rates {
   double progress = 0.0;
   std::optional<double> set_learning_rate, set_epsilon;
@@ -143,8 +141,9 @@ struct Rates {
   }
 };
 
-/// Base of agents whose learning rate and epsilon may change. Each change calls
-/// `apply_rates(change)`, where change(agent) makes the same change in another agent.
+/// Base of agents whose learning rate and epsilon may change. After each change it calls
+/// `apply_rates(change)` of the derived class, where change(agent) makes the same change in another
+/// agent, such as the one of a Controller.
 template <class Agent>
 class WithRates {
  public:

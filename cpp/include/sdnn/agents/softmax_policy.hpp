@@ -19,23 +19,24 @@ namespace sdnn::agents {
 /// A softmax policy for each dimension of the action: pi(a | s) = exp h(s, a) / sum_b exp h(s, b).
 /// The preference h(s, a) is the inner product of the action's weights and the code of s.
 ///
-/// A preference is an integer in units of 2^-n_unit_bits(). Weights are clipped to 23 bits, with
-/// which preferences reach at least +-64.
+/// A preference is an integer in units of 2^-n_unit_bits(). Weights, in the same units, are clipped
+/// to 23 bits; preferences still reach at least +-64.
 class SoftmaxPolicy {
  public:
   using Code = approximators::LinearCode;
   using Trace = approximators::LinearTrace;
 
-  /// The memory of one reader: the preferences of all actions and their probabilities.
+  /// The memory in which a thread reads the policy: the preferences of the actions of all
+  /// dimensions, one after the other, and their probabilities.
   struct Workspace {
     std::vector<std::int64_t> preferences;
-    std::vector<detail::SoftmaxTerm> terms;  ///< of all dimensions
+    std::vector<detail::SoftmaxTerm> terms;
   };
 
   /// The rates of a step of learning.
   struct Step {
     std::int32_t error = 0;    ///< the normalized TD error, in units of 1 / kErrorOne
-    std::int32_t rate = 0;     ///< of the error, in units of 2^-16
+    std::int32_t rate = 0;     ///< the learning rate, in units of 2^-16
     std::int32_t entropy = 0;  ///< the weight of the entropy's gradient, in units of 2^-16
     std::int32_t decay = 0;    ///< gamma lambda, in units of 1 / kDecayOne
   };
@@ -43,9 +44,9 @@ class SoftmaxPolicy {
   static constexpr std::int32_t kErrorOne = 1 << kErrorBits;
 
   /// Makes equal preferences for n_actions[d] actions of each dimension d, over codes of
-  /// `n_columns` columns of which about a quarter are not 0. So many weights of 2^23 add up to a
-  /// preference of at least 2^(23 - 16 - 1) = 64. With more than 40 bits, the unit would be smaller
-  /// than that of the products by which `learn` moves weights.
+  /// `n_columns` columns. About n = n_columns / 4 of these are not 0. With b = 16 + bit_width(n)
+  /// bits of the unit, n weights of almost 2^23 units are a preference of n 2^23 / 2^b, at least
+  /// 2^6 = 64, since bit_width(n) <= 1 + log2(n). Products in `learn` limit b to 40.
   SoftmaxPolicy(std::vector<std::size_t> n_actions, std::size_t n_columns)
       : n_actions_(std::move(n_actions)),
         n_columns_(n_columns),
@@ -67,7 +68,7 @@ class SoftmaxPolicy {
   }
   Trace trace() const { return {n_rows_, n_columns_}; }
 
-  /// Computes the preferences in the state of a code: the slow part of an act.
+  /// Computes the preferences for a code, the slow part of an act, or copies those that were kept.
   void read(const Code& code, Workspace& workspace) const {
     if (code.signs() == read_signs_) {
       std::ranges::copy(read_preferences_, workspace.preferences.begin());
@@ -75,7 +76,7 @@ class SoftmaxPolicy {
     }
     sum_rows(code, 0, n_rows_, workspace.preferences);
   }
-  /// Computes the preferences, and keeps them for later calls of `read`, as long as weights stay.
+  /// Computes the preferences, and keeps them for calls of `read` until the next `learn`.
   void read_and_keep(const Code& code, Workspace& workspace) {
     read(code, workspace);
     if (code.signs() == read_signs_) return;
@@ -92,7 +93,7 @@ class SoftmaxPolicy {
     }
   }
 
-  /// The terms of a dimension, of the state that was read last.
+  /// The terms of a dimension's actions, which `allow` has computed.
   std::span<const detail::SoftmaxTerm> terms(const Workspace& workspace, std::size_t d) const {
     std::size_t first = 0;
     for (std::size_t i = 0; i < d; ++i) first += n_actions_[i];
@@ -122,18 +123,23 @@ class SoftmaxPolicy {
     return static_cast<double>((above - below) * (1 << 16) / sum) / (1 << 16);
   }
 
-  /// Decays the trace, adds the gradient of log pi(action | s) to it, and moves the weights along
-  /// the trace by rate / n times the error, and along the gradient of the entropy, where n is the
-  /// number of columns of the code that are not 0. Requires that `read` has read the code, and
-  /// `allow` was called. If there is a next code, its preferences are computed row by row while the
-  /// changed weights are in the cache, and kept for `read`.
+  /// Decays the trace, and adds the gradient of log pi(action | s). Then moves the weights by rate
+  /// / n times the error along the trace, and by rate / n times the entropy's weight along the
+  /// gradient of the entropy, where n is the number of columns of the code that are not 0. Requires
+  /// that `read` has read the code, and `allow` was called.
+  ///
+  /// The preferences of a `next` code, if there is one, are computed while the changed rows are in
+  /// the processor's cache, and kept for `read`.
   void learn(const Code& code, const Workspace& workspace, std::span<const std::size_t> action,
              Trace& trace, const Step& step, const Code* next = nullptr) {
     read_signs_.clear();
     const std::int64_t n = std::max<std::int64_t>(1, code.n_active());
     const std::int64_t rate = (std::int64_t{step.rate} << 12) / n;  // in units of 2^-28
+    // Error times rate, in units of 2^-12 and 2^-28, converted to the unit of weights.
     const std::int64_t along_trace =
         approximators::scaled(step.error, rate, kErrorBits + 28 - n_unit_bits_);
+    // RowStep::step has at most 13 bits. A larger step is divided by 2^n_bits, and the products
+    // with traces, which have 12 fractional bits, are shifted by n_bits less.
     int n_bits = 0;
     while (std::abs(along_trace) >> n_bits >= (1 << 13) - 1) ++n_bits;
     approximators::RowStep row_step{
@@ -148,9 +154,11 @@ class SoftmaxPolicy {
       const auto of_dimension = terms(workspace, d);
       for (std::size_t a = 0; a < of_dimension.size(); ++a, ++row) {
         const detail::SoftmaxTerm& term = of_dimension[a];
+        // The gradient of log pi is (1 if it is the action) - p, in units of 2^-12 as traces are.
         row_step.gain =
             (a == action[d] ? approximators::kTraceOne : 0) -
             static_cast<std::int32_t>(approximators::scaled(term.probability, 1, 16 - 12));
+        // Slope, weight and rate are in units of 2^-16, 2^-16 and 2^-28, 2^-60 in all.
         row_step.correction = static_cast<std::int32_t>(approximators::scaled(
             std::int64_t{term.entropy_slope} * step.entropy, rate, 60 - n_unit_bits_));
         std::int32_t* const weights = &weights_[row * n_columns_];
@@ -158,10 +166,9 @@ class SoftmaxPolicy {
             weights, trace.row(row), code.signs().data(), n_columns_, row_step);
         trace.set_live(row, use.traces != 0);
         if (use.weights >= approximators::kLargestWeight - 1) clip(weights);
-        const std::size_t n_learned = row + 1;
-        if (next != nullptr && (n_learned % kRowsInCache == 0 || n_learned == n_rows_)) {
-          const std::size_t first = row - row % kRowsInCache;
-          sum_rows(*next, first, n_learned, read_preferences_);
+        const std::size_t end = row + 1;
+        if (next != nullptr && (end % kRowsAtOnce == 0 || end == n_rows_)) {
+          sum_rows(*next, row - row % kRowsAtOnce, end, read_preferences_);
         }
       }
     }
@@ -182,9 +189,10 @@ class SoftmaxPolicy {
   }
 
  private:
-  static constexpr std::size_t kRowsInCache = 4;  ///< rows whose signs `row_sums` reads once
+  /// Rows whose preferences `learn` computes together: `row_sums` reads a code once for four rows.
+  static constexpr std::size_t kRowsAtOnce = 4;
 
-  /// Computes the preferences of some rows.
+  /// Computes the preferences of the rows from `row` to `end`, 64 at a time.
   void sum_rows(const Code& code, std::size_t row, std::size_t end,
                 std::vector<std::int64_t>& preferences) const {
     constexpr std::size_t kAtOnce = 64;
@@ -199,6 +207,7 @@ class SoftmaxPolicy {
     }
   }
 
+  /// Clips the weights of a row to 23 bits.
   void clip(std::int32_t* weights) const noexcept {
     constexpr std::int32_t kMost = approximators::kLargestWeight - 1;
     for (std::size_t j = 0; j < n_columns_; ++j) weights[j] = std::clamp(weights[j], -kMost, kMost);

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <set>
 #include <span>
 #include <utility>
@@ -28,18 +27,19 @@ class WarmUp {
  public:
   /// A transition, with observations and the action in the units of the task.
   struct Step {
-    bool begins;  ///< an episode
+    bool begins;  ///< whether it is the first of an episode
     std::size_t environment;
     std::span<const double> observation, action;
     double reward;
     std::span<const double> next_observation;
     bool terminated;
     ActionMask next_mask = {};
-    bool is_own = true;  ///< of an episode in which the agent acted
+    bool is_own = true;  ///< whether the agent acted in its episode; else it is from a log
     double dt = 1.0;     ///< its duration in usual steps
   };
 
-  /// Without `learns_any_transition` the warm-up does not end while an action is not learned yet.
+  /// The warm-up lasts for n_steps transitions. Without `learns_any_transition`, for agents that
+  /// learn only their last action, it does not end between an act and the learning of its result.
   WarmUp(std::size_t n_variables, std::size_t n_dimensions, std::size_t n_steps, std::uint64_t seed,
          bool learns_any_transition)
       : n_variables_(n_variables),
@@ -55,7 +55,7 @@ class WarmUp {
   void set_n_environments(std::size_t n) {
     episodes_.resize(n, [this] { return Episode(n_dimensions_); });
   }
-  /// The number of environments now, or when a transition was remembered, whichever is larger.
+  /// The number of environments now, or of those with transitions, as some may have been removed.
   std::size_t n_in_all() const {
     std::size_t n = n_environments();
     for (const std::int64_t i : environments_) n = std::max(n, static_cast<std::size_t>(i) + 1);
@@ -68,19 +68,18 @@ class WarmUp {
     return size() >= n_steps_ && std::ranges::none_of(episodes_, &Episode::acted);
   }
 
-  /// Begins an episode: no action of the last one is repeated. Throws std::invalid_argument if
-  /// there is no such environment.
+  /// Begins an episode, without repeating an action of the last. Throws std::invalid_argument.
   void begin_episode(std::size_t environment) {
     Episode& episode = episodes_.of(environment);
     episode.begins = true;
     episode.n_kept = 0;
     episode.acted = episode.has_acted = false;
   }
-  /// Whether the agent has acted in an episode. Throws std::invalid_argument if there is none.
+  /// Whether the agent has acted in the present episode. Throws std::invalid_argument.
   bool has_acted(std::size_t environment) const { return episodes_.of(environment).has_acted; }
 
-  /// Returns a random action: a repeated one while it is allowed, else one that
-  /// `draw(generator, action)` writes. Without `explore` it is drawn from a separate stream. Throws
+  /// Returns a random action: the last one while it is repeated and allowed, else a new one that
+  /// `draw(generator, action)` writes. Without `explore` a separate stream draws a new one. Throws
   /// std::invalid_argument if the environment does not exist.
   template <class Draw, class IsAllowed>
   std::vector<double> act(const Draw& draw, const IsAllowed& is_allowed, bool explore,
@@ -122,13 +121,13 @@ class WarmUp {
     episode.has_acted = step.is_own;
   }
 
-  /// All that was observed. Shape: (n, n_variables), row by row.
-  std::vector<double> seen() const {
-    std::vector<double> seen = observations_;
-    seen.insert(seen.end(), next_observations_.begin(), next_observations_.end());
-    return seen;
+  /// All observations, then all next observations. Shape: (2 size, n_variables).
+  std::vector<double> all_observations() const {
+    std::vector<double> all = observations_;
+    all.insert(all.end(), next_observations_.begin(), next_observations_.end());
+    return all;
   }
-  /// Transition number t, in the order in which they came.
+  /// Transition number t, in the order in which they were learned.
   Step step(std::size_t t) const {
     const auto row = [t](const std::vector<double>& values, std::size_t n) {
       return std::span(values).subspan(t * n, n);
@@ -165,13 +164,11 @@ class WarmUp {
         [&](auto& episode) {
           archive.number("episode.begins", episode.begins);
           archive.number("episode.acted", episode.acted);
-          std::optional<bool> has_acted;  // none where an agent acts and learns in turn
-          if (episode.has_acted == episode.begins) has_acted = episode.has_acted;
-          archive.number("episode.has_acted", has_acted);
+          // Usually an agent has acted unless the episode begins with its next transition.
+          archive.number_unless("episode.has_acted", episode.has_acted, !episode.begins);
           archive.number("episode.n_kept", episode.n_kept);
           archive.numbers("episode.kept", episode.kept);
           if constexpr (Archive::kReads) {
-            episode.has_acted = has_acted.value_or(!episode.begins);
             archive.expect(episode.kept.size() == self.n_dimensions_, "episode.kept", "an action");
             archive.expect(episode.n_kept >= 0 && episode.n_kept <= 100, "episode.n_kept",
                            "in [0, 100]");
@@ -193,18 +190,20 @@ class WarmUp {
   /// The state of the present episode in one environment.
   struct Episode {
     explicit Episode(std::size_t n_dimensions) : kept(n_dimensions) {}
-    bool begins = true;        ///< with its next transition
-    bool acted = false;        ///< and must learn of it
-    bool has_acted = false;    ///< in the episode
-    std::vector<double> kept;  ///< the random action
-    std::int64_t n_kept = 0;   ///< steps that it will still last
+    bool begins = true;        ///< whether its next transition is its first
+    bool acted = false;        ///< whether the result of an act must still be learned
+    bool has_acted = false;    ///< whether the agent has acted in it
+    std::vector<double> kept;  ///< the random action that is repeated
+    std::int64_t n_kept = 0;   ///< steps for which it will be repeated
   };
 
-  static constexpr std::uint64_t kStream = std::uint64_t{1} << 32U;
-  static constexpr double kMostRepetitions = 100.0;
+  static constexpr std::uint64_t kStream = std::uint64_t{1} << 32U;  // of the agent's seed
+  static constexpr double kMostRepetitions = 100.0;                  // chosen
 
+  /// The size of each transition's mask: 0 until a transition had one.
   std::size_t mask_size() const noexcept { return size() == 0 ? 0 : next_masks_.size() / size(); }
-  /// Appends the mask of the next transition. Where others have none, all actions are allowed.
+  /// Appends the mask of a transition. Once a transition had one, all others get a mask that allows
+  /// every action. Called before the transition's reward is appended, which size() counts.
   void note_mask(ActionMask mask) {
     const std::size_t n = std::max(mask.size(), mask_size());
     next_masks_.resize(size() * n, 1);
@@ -212,14 +211,14 @@ class WarmUp {
     next_masks_.resize((size() + 1) * n, 1);
   }
 
-  /// Appends whether the next transition was read from a log; none were where the list is empty.
+  /// Appends whether a transition is from a log. The list is empty until one is.
   void note_origin(bool is_own) {
     if (is_own && logged_.empty()) return;
     logged_.resize(size());
     logged_.push_back(is_own ? 0 : 1);
   }
 
-  /// Appends the duration of the next transition; all were usual where the list is empty.
+  /// Appends the duration of a transition. The list is empty until one is not 1.
   void note_duration(double dt) {
     if (dt == 1.0 && dts_.empty()) return;
     dts_.resize(size(), 1.0);
@@ -242,7 +241,7 @@ class WarmUp {
     archive.expect(environments_.size() == n, "environments", "one per reward");
     archive.expect(!is_over(), "rewards", "fewer than the warm-up's steps");
     const auto is_environment = [](std::int64_t i) {
-      return i >= 0 && i < static_cast<std::int64_t>(Episodes<Episode>::kMost);
+      return i >= 0 && i < static_cast<std::int64_t>(kMostEnvironments);
     };
     archive.expect(std::ranges::all_of(environments_, is_environment), "environments",
                    "numbers of environments");

@@ -1,4 +1,4 @@
-/// The settings of an approximator that follow from a task, and patterns among an agent's state.
+/// The settings of an approximator that follow from a task, and patterns in an agent's state.
 #pragma once
 
 #include <algorithm>
@@ -23,9 +23,8 @@
 
 namespace sdnn::agents::detail {
 
-/// Whether a linear readout becomes a table with separate weights for every state: if the states
-/// can be listed, are not more than other codes have columns, and neither units nor patterns are
-/// set.
+/// Whether a linear readout has separate weights for every state: if states are countable and few
+/// enough, so that this needs no more columns, and neither units nor patterns are set.
 inline bool is_table(const ControllerConfig& config, const Observations& observations,
                      const std::vector<coding::PatternTable>& tables) noexcept {
   constexpr std::size_t kMostStates = 1536;  // a table of n states has 2 n columns, others 3,072
@@ -35,8 +34,8 @@ inline bool is_table(const ControllerConfig& config, const Observations& observa
          n <= kMostStates;
 }
 
-/// The number of bins of an input that is not a symbol or, with tables, of each input; empty for
-/// approximators without codes.
+/// The number of bins of each input with tables; else a single number, that of inputs that are no
+/// symbols. Empty for approximators without codes.
 inline std::vector<std::size_t> n_bins_of_inputs(const AnyApproximatorConfig& approximator,
                                                  const std::vector<coding::PatternTable>& tables) {
   std::vector<std::size_t> n_bins;
@@ -54,8 +53,9 @@ inline std::vector<std::size_t> n_bins_of_inputs(const AnyApproximatorConfig& ap
   return n_bins;
 }
 
-/// Returns the patterns of each input if they do not follow from the approximator's settings: the
-/// one-hot patterns of a table of states, or the passed ones plus a pattern for missing readings.
+/// Returns the patterns of each input, or nothing if they follow from the approximator's settings:
+/// one-hot patterns of a table of states, or the custom `tables`, with an additional pattern for
+/// missing readings where these are coded.
 inline std::vector<coding::PatternTable> tables_of(const ControllerConfig& config,
                                                    const Observations& observations,
                                                    const AnyApproximatorConfig& approximator,
@@ -75,17 +75,17 @@ inline std::vector<coding::PatternTable> tables_of(const ControllerConfig& confi
       approximator);
 }
 
-/// The default limit of the number of pairs, which bounds the time of a linear readout's step: it
-/// allows all pairs of 32 inputs, and applies only if inputs were selected. 0: no limit.
+/// The default limit of the number of pairs, which bounds the time of a linear readout's step; 0:
+/// no limit. It applies only if inputs are selected, and allows all pairs of 32 inputs, 32 * 31.
 inline int most_pairs(const ControllerConfig& config, std::int64_t n_inputs) noexcept {
   constexpr int kMost = 1024;
   const bool is_chosen = is_linear(config.approximator) && config.observation.relevant_only;
   return is_chosen && n_inputs * (n_inputs - 1) > kMost ? kMost : 0;
 }
 
-/// Returns the approximator's settings with the numbers of inputs and actions, circular inputs and
-/// symbols of a task whose ranges are known. Throws std::invalid_argument for tables that do not
-/// fit its symbols.
+/// Returns the approximator's settings with the inputs (numbers, circular ones and symbols) and
+/// actions of a task whose ranges are known. Throws std::invalid_argument for tables that do not
+/// fit the symbols.
 inline AnyApproximatorConfig approximator_of(const ControllerConfig& config,
                                              const Observations& observations,
                                              const HistoryFilter& history, const Actions& actions,
@@ -96,26 +96,26 @@ inline AnyApproximatorConfig approximator_of(const ControllerConfig& config,
       sized.n_actions = static_cast<int>(actions.n_actions().front());
     }
   };
-  const auto fill_in_code = [&](auto& own) {
-    if constexpr (requires { own.circular; }) {
+  const auto fill_in_code = [&](auto& coded) {
+    if constexpr (requires { coded.circular; }) {
       const auto circular = history.is_none() ? observations.circular() : history.circular();
       const auto n_symbols = history.is_none() ? observations.n_symbols() : history.n_symbols();
       const auto has = [](const auto& list) {
         return std::ranges::any_of(list, [](auto number) { return number != 0; });
       };
-      if (has(circular) && own.circular.empty()) own.circular = circular;
-      if (has(n_symbols) && own.n_symbols.empty()) own.n_symbols = n_symbols;
-      if constexpr (requires { own.action_window; }) {
-        if (config.action.discrete) own.action_window = 1;
+      if (has(circular) && coded.circular.empty()) coded.circular = circular;
+      if (has(n_symbols) && coded.n_symbols.empty()) coded.n_symbols = n_symbols;
+      if constexpr (requires { coded.action_window; }) {
+        if (config.action.discrete) coded.action_window = 1;
         if (is_table(config, observations, tables)) {
-          own.n_pattern_units = static_cast<int>(observations.n_states());
+          coded.n_pattern_units = static_cast<int>(observations.n_states());
         }
-        auto first = own;  // inputs that are added have as many units
+        auto first = coded;  // the first inputs decide the units, which added inputs do not change
         if (history.is_none()) first.n_inputs = static_cast<int>(observations.n_first_inputs());
-        if (own.max_pairs == 0) {
-          own.max_pairs = first.max_pairs = most_pairs(config, first.n_inputs);
+        if (coded.max_pairs == 0) {
+          coded.max_pairs = first.max_pairs = most_pairs(config, first.n_inputs);
         }
-        own.n_pattern_units = approximators::with_pattern_units(first).n_pattern_units;
+        coded.n_pattern_units = approximators::with_pattern_units(first).n_pattern_units;
       }
       for (std::size_t i = 0; i < std::min(tables.size(), n_symbols.size()); ++i) {
         auto n = static_cast<std::size_t>(n_symbols[i]);
@@ -133,7 +133,7 @@ inline AnyApproximatorConfig approximator_of(const ControllerConfig& config,
 
 inline std::string name_of_table(std::size_t i) { return "table." + std::to_string(i); }
 
-/// Lists the tables' signs; where they are read, tables_in has already made them.
+/// Lists the signs of custom patterns. A reader only checks them: tables_in has made the tables.
 template <class Archive>
 void serialize_tables(const std::vector<coding::PatternTable>& tables, Archive& archive) {
   for (std::size_t i = 0; i < tables.size(); ++i) {
@@ -148,14 +148,14 @@ void serialize_tables(const std::vector<coding::PatternTable>& tables, Archive& 
   }
 }
 
-/// Throws std::invalid_argument naming a tensor that is no table.
+/// Returns the custom patterns in a state. Throws std::invalid_argument naming a bad tensor.
 inline std::vector<coding::PatternTable> tables_in(const core::State& state) {
   std::vector<coding::PatternTable> tables;
   for (;;) {
     const std::string name = name_of_table(tables.size());
-    const auto found = state.find(name);
-    if (found == state.end()) return tables;
-    const core::Tensor& tensor = found->second;
+    const auto item = state.find(name);
+    if (item == state.end()) return tables;
+    const core::Tensor& tensor = item->second;
     const bool is_table = tensor.type == core::TensorType::i8 && tensor.shape.size() == 2 &&
                           tensor.shape[0] * tensor.shape[1] == tensor.bytes.size();
     core::require(is_table, "state: " + name, "a table of I8", tensor.shape.size());

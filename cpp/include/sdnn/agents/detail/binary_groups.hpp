@@ -13,14 +13,15 @@
 
 namespace sdnn::agents::detail {
 
-/// The rows of one input in which it has the larger of two values.
+/// Whether an input is binary, and the rows in which it is on, which means the larger of its two
+/// values: the rows before all steps, then those after them.
 struct BinaryInput {
   bool is_binary = false;
   std::vector<bool> is_on = {};
 };
 
-/// Returns whether an input is binary, from its values before and after each step; rows have
-/// `n_inputs` values. An input that never changed counts as binary if it is 0 or 1.
+/// Examines an input's values before and after each step; rows have `n_inputs` values. An input
+/// that never changed counts as binary if it is 0 or 1.
 inline BinaryInput binary_input(std::span<const double> states, std::span<const double> next_states,
                                 std::size_t n_inputs, std::size_t input) {
   double low = states[input], high = low;
@@ -43,17 +44,17 @@ inline BinaryInput binary_input(std::span<const double> states, std::span<const 
 /// Three binary inputs or more.
 struct BinaryGroup {
   std::vector<std::size_t> inputs = {};  ///< in ascending order
-  /// The place of the input that is on, counted from 1, before and after each step; 0 if none is.
-  /// Both are empty in the last group, where several inputs can be on.
+  /// Which of `inputs` is on before and after each step: 1 for the first one, 0 if none is on. Both
+  /// are empty in a group in which several inputs can be on.
   std::vector<std::uint16_t> symbols = {};
   std::vector<std::uint16_t> next_symbols = {};
 };
 
-/// Groups of three or more binary inputs.
+/// Returns the groups of binary inputs.
 ///
 /// Inputs of which at most one is on at a time form a group, like a one-hot vector: each input
-/// joins the first group with whose inputs it is never on together. Inputs without a group of at
-/// least three form a common last group, if they are at least three. Shapes: (n, n_inputs), n > 0.
+/// joins the first group with whose inputs it is never on together. Groups of fewer than three are
+/// dissolved; three or more of their inputs form a last group. Shapes: (n, n_inputs), n > 0.
 inline std::vector<BinaryGroup> binary_groups(std::span<const double> states,
                                               std::span<const double> next_states,
                                               std::size_t n_inputs) {
@@ -94,9 +95,11 @@ inline std::vector<BinaryGroup> binary_groups(std::span<const double> states,
   return groups;
 }
 
-/// Measures how much an action improves the prediction of the next symbol from the present one. A
-/// prediction is measured by the sum, over its conditions, of the squared counts of next symbols
-/// divided by the number of times the condition occurred. Action t + shift belongs to symbol t, so
+/// Measures how much actions improve the prediction of the next symbol from the present one: the
+/// concentration of next symbols, given symbol and action, minus the concentration given the symbol
+/// alone. A concentration is the sum, over all conditions, of the squared counts of next symbols
+/// divided by the count of the condition. A condition that occurred 4 times adds 4^2 / 4 if one
+/// symbol always followed, and (2^2 + 2^2) / 4 if two did. Action t + shift belongs to symbol t, so
 /// that shifted series show the improvement by chance. Shapes: (n,).
 inline double steering(const BinaryGroup& group, std::span<const std::uint8_t> actions,
                        std::size_t shift) {
@@ -109,12 +112,12 @@ inline double steering(const BinaryGroup& group, std::span<const std::uint8_t> a
                                group.next_symbols[t]);
     }
     std::ranges::sort(transitions);
-    // Equal transitions are neighbours now, within those of one condition, symbol and action.
-    double sum = 0.0, squares = 0.0, n_known = 0.0, n_same = 0.0;
+    // Now transitions of a symbol and an action are neighbours, as are equal ones among these.
+    double sum = 0.0, squares = 0.0, n_condition = 0.0, n_same = 0.0;
     for (std::size_t t = 0; t < transitions.size(); ++t) {
       const auto& [symbol, action, next] = transitions[t];
       const bool is_last = t + 1 == transitions.size();
-      n_known += 1.0;
+      n_condition += 1.0;
       n_same += 1.0;
       if (!is_last && transitions[t + 1] == transitions[t]) continue;
       squares += n_same * n_same;
@@ -123,8 +126,8 @@ inline double steering(const BinaryGroup& group, std::span<const std::uint8_t> a
           std::get<1>(transitions[t + 1]) == action) {
         continue;
       }
-      sum += squares / n_known;
-      squares = n_known = 0.0;
+      sum += squares / n_condition;
+      squares = n_condition = 0.0;
     }
     return sum;
   };

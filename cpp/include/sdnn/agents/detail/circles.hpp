@@ -13,38 +13,39 @@
 namespace sdnn::agents::detail {
 
 inline constexpr double kNearCircle = 1e-3;  // allows for single precision and some rounding
-// Thresholds for points around a circle: of |E[x^2 + y^2] - 1|, of minus the correlation of x^2 and
-// y^2, and of the autocorrelation of the radius. With noise of a tenth of the range the correlation
-// is -0.65. A radius that really moves has an autocorrelation above 0.5.
-inline constexpr std::size_t kFewest = 200;  // steps
+/// Thresholds (chosen) for noisy points (x, y) around a circle: of the number of steps, of
+/// |E[x^2 + y^2] - 1|, of minus the correlation of x^2 and y^2, and of the autocorrelation of the
+/// radius. With noise of a tenth of the range the correlation is -0.65; a moving radius has an
+/// autocorrelation above 0.5.
+inline constexpr std::size_t kFewest = 200;
 inline constexpr double kLargestBias = 0.15, kLeastOpposed = 0.5, kMostAlike = 0.2;
 
-/// Returns the finite readings of variable i, or {0} if it has none. Shape: seen (n, n_variables).
-inline std::vector<double> column(std::span<const double> seen, std::size_t n_variables,
+/// Returns the finite readings of variable i, or {0} without any. Shape: (n, n_variables).
+inline std::vector<double> column(std::span<const double> observations, std::size_t n_variables,
                                   std::size_t i) {
   std::vector<double> values;
-  for (; i < seen.size(); i += n_variables) {
-    if (std::isfinite(seen[i])) values.push_back(seen[i]);
+  for (; i < observations.size(); i += n_variables) {
+    if (std::isfinite(observations[i])) values.push_back(observations[i]);
   }
   if (values.empty()) values.push_back(0.0);
   return values;
 }
 
-/// The readings of two variables where both are present before and after a step. The first half is
-/// from before the steps and the second half from after them, as in `seen`.
-inline std::pair<std::vector<double>, std::vector<double>> columns(std::span<const double> seen,
-                                                                   std::size_t n_variables,
-                                                                   std::size_t i, std::size_t j) {
-  const std::size_t half = seen.size() / n_variables / 2 * n_variables;
+/// Returns the readings of variables i and j in all steps before and after which both are present.
+/// The first half of each list is from before the steps and the second half from after them, as in
+/// Observations::fit.
+inline std::pair<std::vector<double>, std::vector<double>> columns(
+    std::span<const double> observations, std::size_t n_variables, std::size_t i, std::size_t j) {
+  const std::size_t half = observations.size() / n_variables / 2 * n_variables;
   const auto is_read = [&](std::size_t row) {
-    return std::isfinite(seen[row + i]) && std::isfinite(seen[row + j]);
+    return std::isfinite(observations[row + i]) && std::isfinite(observations[row + j]);
   };
   std::pair<std::vector<double>, std::vector<double>> columns;
   for (const std::size_t first : {std::size_t{0}, half}) {
     for (std::size_t row = 0; row < half; row += n_variables) {
       if (!is_read(row) || !is_read(half + row)) continue;
-      columns.first.push_back(seen[first + row + i]);
-      columns.second.push_back(seen[first + row + j]);
+      columns.first.push_back(observations[first + row + i]);
+      columns.second.push_back(observations[first + row + j]);
     }
   }
   return columns;

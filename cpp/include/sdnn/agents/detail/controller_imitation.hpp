@@ -1,6 +1,8 @@
-/// How a controller checks and learns a transition, and learns from a teacher.
+/// Functions of Controller that check and learn transitions, and those that learn from a teacher.
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <type_traits>
@@ -11,11 +13,11 @@
 #include "sdnn/agents/controller.hpp"
 #include "sdnn/agents/duration.hpp"
 #include "sdnn/agents/exploration.hpp"
+#include "sdnn/agents/fuzzy_q_learning.hpp"
 #include "sdnn/core/detail/check.hpp"
 
 namespace sdnn::agents {
 
-/// Throws std::invalid_argument for a transition that learn would refuse, and changes nothing.
 inline void Controller::check(std::span<const double> observation, std::span<const double> action,
                               double reward, std::span<const double> next_observation,
                               bool terminated, std::size_t environment, ActionMask next_mask,
@@ -33,8 +35,8 @@ inline void Controller::check(std::span<const double> observation, std::span<con
   observations_.scale(next_observation, state, "next_observation");
 }
 
-/// Whether the agent acts in an episode, so that its transitions are steps of a search; always
-/// where agents do not search.
+/// Whether the agent itself acts in the present episode, so that transitions are not from a log.
+/// For agents that treat both alike it is always true.
 inline bool Controller::has_acted(std::size_t environment) const {
   return std::visit(
       [environment](const auto& agent) {
@@ -46,7 +48,6 @@ inline bool Controller::has_acted(std::size_t environment) const {
       *agent_);
 }
 
-/// Refused rewards count in a warm-up, and where an agent does not count itself.
 inline std::uint64_t Controller::n_learned() const {
   if (warm_up_) return is_on_policy(config_.learning) ? 0 : warm_up_->size();
   const auto of_agent = [this](const auto& agent) {
@@ -58,7 +59,23 @@ inline std::uint64_t Controller::n_learned() const {
   return std::visit(of_agent, *agent_);
 }
 
-/// Learns the transition in state_, indices_ and next_state_.
+/// Writes the indices of an action into indices_: those of the last exploring act if it took the
+/// same action, because rounding can make several indices the same action. For fuzzy agents, only
+/// checks that it is that action, since they can learn no other.
+inline void Controller::find_indices(std::span<const double> action, std::size_t environment) {
+  actions_.require_action(action);
+  if (auto* const fuzzy = std::get_if<FuzzyQLearning>(&*agent_)) {
+    actions_.take(fuzzy->last_action(environment), action_, indices_);
+    core::require(fuzzy->explored_in(state_, environment) && std::ranges::equal(action, action_),
+                  "observation and action", "those of the last exploring act", "others");
+    return;
+  }
+  if (last_actions_.find(environment, action, indices_)) return;
+  for (std::size_t d = 0; d < action.size(); ++d) indices_[d] = actions_.index_of(action[d], d);
+}
+
+/// Learns the transition of state_, indices_ and next_state_, unless its reward is refused. At the
+/// end of a window of rewards, an integer agent may make its unit of values smaller.
 inline void Controller::learn_scaled(double reward, bool terminated, std::size_t environment,
                                      ActionMask next_mask, bool is_own, double dt) {
   RewardScale scale = reward_scale_;  // unchanged if the agent throws
@@ -93,7 +110,6 @@ inline void Controller::end_warm_up_of_teacher() {
   end_warm_up(kHeadroomOfTeacher);
 }
 
-/// Learns a teacher's action as the best one, in a state of this value; see the class.
 inline void Controller::imitate(std::span<const double> observation, std::span<const double> action,
                                 double value, double margin) {
   core::require_in_range("value", value, -kLargestReward, kLargestReward);
@@ -121,7 +137,6 @@ inline void Controller::imitate(std::span<const double> observation, std::span<c
   readings_.note(held_, 0, false);
 }
 
-/// Notes a teacher's step for the history and for missing readings, but learns nothing.
 inline void Controller::follow_teacher(std::span<const double> observation,
                                        std::span<const double> action) {
   const auto filled = readings_.filled(observation, 0, false, held_);

@@ -1,4 +1,4 @@
-/// How a controller finds its ranges and inputs: in a warm-up, later, and in a saved state.
+/// Functions of Controller that find ranges and inputs: in a warm-up, later, in a saved state.
 #pragma once
 
 #include <algorithm>
@@ -30,8 +30,8 @@ namespace sdnn::agents {
 
 namespace detail {
 
-/// Returns transitions with scaled states, one environment after the other. The reward of a
-/// transition that is not learned, because it is far too large, counts as 0.
+/// Returns transitions with states scaled by `fitted`, one environment after the other. A reward
+/// that will be refused because it is far too large counts as 0.
 inline RandomExperience experience_of(const Observations& fitted, const WarmUp& transitions,
                                       std::size_t n_dimensions) {
   std::vector<std::size_t> order(transitions.size());
@@ -62,7 +62,7 @@ inline RandomExperience experience_of(const Observations& fitted, const WarmUp& 
   return experience;
 }
 
-/// The number of inputs before others were added; 0 if none was added.
+/// The number of inputs before others were added, as make_agent takes it; 0 if none was added.
 inline std::size_t n_first_inputs(const Observations& observations) noexcept {
   const std::size_t n = observations.n_first_inputs();
   return n < observations.n_inputs() ? n : 0;
@@ -75,9 +75,8 @@ inline WarmUp Controller::new_warm_up() const {
           config_.seed, !is_on_policy(config_.learning)};
 }
 
-/// Makes the agent when all ranges are known. With a `reader`, compares the sizes of the saved
-/// state before it allocates memory. Throws the errors of the approximator; then nothing has
-/// changed.
+/// Makes the agent for observations whose ranges are known. With a `reader`, first compares sizes
+/// with the saved state. Throws the errors of the approximator; then nothing has changed.
 inline void Controller::fit(Observations observations, detail::LastStates last_states,
                             const core::StateReader* reader) {
   last_states.restart(observations, n_dimensions());
@@ -101,7 +100,8 @@ inline void Controller::fit(Observations observations, detail::LastStates last_s
   next_state_.resize(state_.size());
 }
 
-/// Finds impossible settings before the warm-up: those of an agent with all possible inputs.
+/// Throws for settings that would be impossible at the end of the warm-up: makes the agent in a
+/// copy of the controller, with all inputs that there may be, and ranges of observations of 0.
 inline void Controller::try_to_fit() const {
   const History history = config_.observation.history;
   Controller trial = *this;
@@ -120,7 +120,7 @@ inline void Controller::try_to_fit() const {
   trial.fit(std::move(observations), detail::LastStates(filter));
 }
 
-/// Takes a random action.
+/// Writes a random action of the warm-up into action_.
 inline void Controller::act_at_random(std::span<const double> observation, bool explore,
                                       std::size_t environment, ActionMask mask) {
   observations_.require_readings("observation", observation);
@@ -134,7 +134,7 @@ inline void Controller::act_at_random(std::span<const double> observation, bool 
   actions_.take(std::span(drawn), action_, indices_);
 }
 
-/// Remembers a transition until the warm-up is over.
+/// Checks a transition and remembers it for the end of the warm-up, which it may be.
 inline void Controller::remember(const WarmUp::Step& step) {
   observations_.require_readings("observation", step.observation);
   actions_.require_action(step.action);
@@ -144,10 +144,11 @@ inline void Controller::remember(const WarmUp::Step& step) {
   if (warm_up_->is_over()) end_warm_up();
 }
 
-/// Takes ranges, inputs and the history from the warm-up, and makes the agent.
+/// Fits ranges, relevant inputs and the history to the warm-up, and makes the agent. A history is
+/// fitted to all inputs first, as their relevance depends on it, then to those kept.
 inline void Controller::fit_to_warm_up(History history, double headroom) {
   Observations fitted = observations_;
-  fitted.fit(warm_up_->seen(), headroom);
+  fitted.fit(warm_up_->all_observations(), headroom);
   detail::LastStates states;
   if (const bool has_choice = fitted.has_choice(); has_choice || history != History::none) {
     auto experience = detail::experience_of(fitted, *warm_up_, n_dimensions());
@@ -165,8 +166,7 @@ inline void Controller::fit_to_warm_up(History history, double headroom) {
   fit(std::move(fitted), std::move(states));
 }
 
-/// Fits ranges, history and relevant inputs to the random experience, makes the agent, and lets it
-/// learn the transitions unless it learns on policy.
+/// Makes the agent, and lets it learn the transitions of the warm-up unless it is on-policy.
 inline void Controller::end_warm_up(double headroom) {
   const History history = config_.observation.history;
 #if SDNN_EXCEPTIONS
@@ -182,7 +182,7 @@ inline void Controller::end_warm_up(double headroom) {
   const WarmUp warm_up = std::move(*warm_up_);
   reward_scale_ = RewardScale(warm_up.rewards());
   warm_up_.reset();
-  set_n_environments(warm_up.n_in_all());
+  set_n_environments(warm_up.n_in_all());  // the transitions may be of removed environments
   if (is_on_policy(config_.learning)) {
     for (std::size_t i = 0; i < n_environments(); ++i) begin_learned_episode(i);
   } else {
@@ -190,12 +190,12 @@ inline void Controller::end_warm_up(double headroom) {
     for (std::size_t t = 0; t < warm_up.size(); ++t) replay(warm_up.step(t), readings);
   }
   set_n_environments(warm_up.n_environments());
-  watch();
+  watch_for_inputs();
 }
 
 /// Starts to store the latest transitions, in which inputs that were left out may prove relevant.
 /// Only Q(lambda) without a history, custom patterns or a limit of pairs can add inputs.
-inline void Controller::watch() {
+inline void Controller::watch_for_inputs() {
   latest_.reset();
   const auto* const linear = std::get_if<approximators::LinearSDNNConfig>(&approximator_);
   const auto kept = observations_.kept_inputs();
@@ -213,18 +213,18 @@ inline void Controller::add_inputs() {
   const std::vector<bool> kept = observations_.kept_inputs();
   const RandomExperience latest = detail::experience_of(observations_.with_all_inputs(),
                                                         latest_->transitions(), n_dimensions());
-  const std::vector<bool> found = Relevance(latest, kCaution).inputs(kept);
+  const std::vector<bool> relevant = Relevance(latest, kCaution).inputs(kept);
   latest_->forget();
-  if (found == kept) return;
+  if (relevant == kept) return;
   Observations observations = observations_;
-  observations.keep(found);
+  observations.keep(relevant);
   auto before = std::move(std::get<QLambda>(*agent_));
   fit(std::move(observations), last_states_);
   std::get<QLambda>(*agent_).continue_from(std::move(before));
   identity_ = core::Identity();  // readers have workspaces for fewer inputs
 }
 
-/// Learns a transition of the warm-up; `readings` are the last ones before it, and are updated.
+/// Lets the agent learn a transition of the warm-up. The held `readings` are those of the replay.
 inline void Controller::replay(const WarmUp::Step& step, LastReadings& readings) {
   if (step.begins) {
     begin_learned_episode(step.environment);
@@ -242,7 +242,7 @@ inline void Controller::replay(const WarmUp::Step& step, LastReadings& readings)
                step.dt);
 }
 
-/// Prepares to restore a saved state: the warm-up or the agent is made while it is read.
+/// Prepares to restore a saved state: makes an empty warm-up, or lets `serialize` make the agent.
 template <class Archive>
 void Controller::begin_reading(bool is_warming_up, const Archive& archive) {
   archive.expect(!is_warming_up || observations_.needs_fit(), "is_warming_up",
@@ -256,7 +256,7 @@ void Controller::begin_reading(bool is_warming_up, const Archive& archive) {
 /// Checks that restored parts fit each other, such as remembered actions and the action space.
 template <class Archive>
 void Controller::end_reading(const Archive& archive) {
-  archive.expect(taken_.fits(n_environments(), actions_), "taken.indices",
+  archive.expect(last_actions_.fits(n_environments(), actions_), "taken.indices",
                  "of actions and environments");
   if (agent_) {
     std::visit(
@@ -274,7 +274,7 @@ void Controller::end_reading(const Archive& archive) {
     return std::abs(step.reward) <= kLargestReward;
   };
   const auto is_action = [this](const auto& kept) { return actions_.can_be_drawn(kept); };
-  archive.taking("warm_up.actions", [&] {
+  archive.naming("warm_up.actions", [&] {
     archive.expect(warm_up_->each_is(can_be_learned, is_action), "warm_up",
                    "of transitions and actions");
   });
@@ -302,7 +302,7 @@ void Controller::serialize(Self& self, Archive& archive) {
     }
     archive.part("observations", self.observations_);
     if (may_have_history) {
-      if constexpr (Archive::kReads) {
+      if constexpr (Archive::kReads) {  // the sizes of a history follow from the observations
         if (HistoryFilter::adds_inputs(history.kind()) && self.observations_.has_single_input()) {
           self.observations_.repeat_input(false);
         }
@@ -313,13 +313,13 @@ void Controller::serialize(Self& self, Archive& archive) {
     }
     if constexpr (Archive::kReads) {
       self.fit(self.observations_, detail::LastStates(std::move(history)), &archive);
-      self.watch();
+      self.watch_for_inputs();
     }
     if (self.latest_) archive.part("latest", *self.latest_);
     std::visit([&archive](auto& agent) { archive.part("agent", agent); }, *self.agent_);
     archive.part("reward_scale", self.reward_scale_);
   }
-  archive.part("taken", self.taken_);
+  archive.part("taken", self.last_actions_);
   if (!is_warming_up && (self.observations_.is_running() || !self.history().is_none())) {
     archive.part("last_states", self.last_states_);
   }

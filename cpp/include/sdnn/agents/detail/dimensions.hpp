@@ -39,8 +39,7 @@ class Parts : public std::vector<Part> {
   ~Parts() = default;
 };
 
-/// Returns a vector with a single part, for agents with actions of one dimension. An initializer
-/// list would copy the part.
+/// Returns a vector with a single part, which an initializer list would copy.
 template <class Part>
 std::vector<Part> only(Part part) {
   std::vector<Part> parts;

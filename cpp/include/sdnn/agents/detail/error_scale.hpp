@@ -7,7 +7,7 @@
 
 namespace sdnn::agents::detail {
 
-/// Returns the integer part of the square root.
+/// Returns the integer part of the square root, digit by digit in base 4.
 constexpr std::uint64_t square_root(std::uint64_t x) noexcept {
   std::uint64_t root = 0;
   for (std::uint64_t bit = std::uint64_t{1} << 62; bit != 0; bit >>= 2) {
@@ -21,13 +21,14 @@ constexpr std::uint64_t square_root(std::uint64_t x) noexcept {
   return root;
 }
 
-/// Divides errors by their running root mean square, over about the last 1,024 errors.
+/// Divides errors by their running root mean square: the mean of all errors so far or, after 1,024
+/// errors, an exponential average with a rate of 1 / 1,024.
 class ErrorScale {
  public:
   /// Divides an error, an integer in units of 2^exponent, by the root mean square of the errors so
   /// far, this one included. The quotient has 12 fractional bits and is clipped to [-3, 3].
   std::int32_t normalized(std::int64_t error, std::int32_t exponent) noexcept {
-    // The mean square is converted to the unit of this error, by 4 for each power of 2.
+    // The mean square is converted to the unit of this error: a factor of 4 for each power of 2.
     for (; exponent_ < exponent && mean_square_ > 0; ++exponent_) mean_square_ >>= 2;
     for (; exponent_ > exponent && mean_square_ > 0; --exponent_) {
       mean_square_ = std::min(mean_square_ << 2, kLargestMean);
@@ -64,10 +65,10 @@ class ErrorScale {
 
  private:
   static constexpr int kLowBits = 8;        ///< dropped from errors, so that squares fit
-  static constexpr int kFractionBits = 10;  ///< of the mean square, so that a 1024th of it counts
-  static constexpr int kQuotientBits = 12;
+  static constexpr int kFractionBits = 10;  ///< of the mean square, so that 1 / 1,024 of it counts
+  static constexpr int kQuotientBits = 12;  ///< fractional bits of a normalized error
   static constexpr std::int64_t kLargestQuotient = 3;
-  /// Errors have at most 33 bits, and thus sizes 25; a square has 50 bits and 10 of fraction.
+  /// An error has 33 bits at most, 25 without the low ones; its square has 50, and 10 of fraction.
   static constexpr std::int64_t kLargestSize = (std::int64_t{1} << 25) - 1;
   static constexpr std::int64_t kLargestMean = std::int64_t{1} << 60;
   static constexpr std::int64_t kWindow = 1024;  ///< errors in the running mean

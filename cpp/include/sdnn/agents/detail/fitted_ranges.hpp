@@ -14,31 +14,45 @@
 
 namespace sdnn::agents {
 
-/// Fits unknown ranges and narrows those that are much too wide. `seen` has observations, then as
-/// many next ones.
-inline void Observations::fit(std::span<const double> seen, double headroom) {
-  const auto pairs = config_.find_angle_pairs ? pairs_in(seen) : config_.angle_pairs;
-  for (std::size_t i = 0; running_ && i < seen.size() / 2; i += n_variables()) {
-    running_->note(seen.subspan(i, n_variables()));
+inline void Observations::fit(std::span<const double> observations, double headroom) {
+  const auto pairs = config_.find_angle_pairs ? pairs_in(observations) : config_.angle_pairs;
+  if (running_) {  // the observations before steps; those after them are mostly the same
+    for (std::size_t i = 0; i < observations.size() / 2; i += n_variables()) {
+      running_->note(observations.subspan(i, n_variables()));
+    }
   }
   Ranges ranges = fixed_ranges(pairs);
   const bool narrows = config_.narrowed && inputs_with(pairs).size() <= kFewInputs;
   for (std::size_t i = 0; i < n_variables(); ++i) {
     if (is_unknown(ranges.low[i])) {
       std::tie(ranges.low[i], ranges.high[i]) =
-          fitted_range(detail::column(seen, n_variables(), i), i, headroom);
+          fitted_range(detail::column(observations, n_variables(), i), i, headroom);
     } else if (narrows && roles_[i] == Role::number && !is_one_of(pairs, i)) {
-      narrow(ranges, i, detail::column(seen, n_variables(), i), headroom);
+      narrow(ranges, i, detail::column(observations, n_variables(), i), headroom);
     }
   }
-  take(ranges, pairs);
+  set_ranges(ranges, pairs);
 }
 
-/// Replaces the range of variable i by a fitted one if it is much wider than the observed values
-/// and contains them.
-inline void Observations::narrow(Ranges& ranges, std::size_t i, const std::vector<double>& seen,
+/// Finds neighbouring variables that are cosine and sine of an angle.
+inline Observations::Pairs Observations::pairs_in(std::span<const double> observations) const {
+  Pairs pairs;
+  for (std::size_t i = 0; i + 1 < n_variables(); ++i) {
+    if (roles_[i] != Role::number || roles_[i + 1] != Role::number) continue;
+    const auto [cosines, sines] = detail::columns(observations, n_variables(), i, i + 1);
+    if (detail::is_on_circle(cosines, sines) || detail::is_around_circle(cosines, sines)) {
+      pairs.push_back({static_cast<int>(i), static_cast<int>(i + 1)});
+      ++i;  // the sine is no part of another pair
+    }
+  }
+  return pairs;
+}
+
+/// Replaces the range of variable i by one that is fitted to its observed values, if it is much
+/// wider and contains the values. A variable that hardly moves keeps its range.
+inline void Observations::narrow(Ranges& ranges, std::size_t i, const std::vector<double>& values,
                                  double headroom) {
-  const auto [least, most] = std::ranges::minmax(seen);
+  const auto [least, most] = std::ranges::minmax(values);
   const double rounding = kRounding * std::max(std::abs(least), std::abs(most));
   if (!(most - least > rounding)) return;
   const auto [low, high] = widened(least, most, headroom);
@@ -49,7 +63,8 @@ inline void Observations::narrow(Ranges& ranges, std::size_t i, const std::vecto
   ranges.high[i] = std::min(high, ranges.high[i]);
 }
 
-/// The range with `headroom` times its width more at each end; for a constant, times its size.
+/// Returns a range that is wider at each end by `headroom` times its width. The width of a single
+/// value x counts as the larger of |x| and 1.
 inline std::pair<double, double> Observations::widened(double low, double high,
                                                        double headroom) noexcept {
   low = std::clamp(low, -kLargest, kLargest);
@@ -59,14 +74,15 @@ inline std::pair<double, double> Observations::widened(double low, double high,
 }
 
 /// Returns the range of variable i that fits its observed values. Adaptive ranges leave out the
-/// most extreme twentieth at each end; a variable that hardly moves keeps its fixed range.
-inline std::pair<double, double> Observations::fitted_range(std::vector<double> seen, std::size_t i,
-                                                            double headroom) const {
-  std::ranges::sort(seen);
-  auto [low, high] = widened(seen.front(), seen.back(), headroom);
+/// most extreme twentieth at each end, and stay within the fixed range unless other values are
+/// observed. A variable that hardly moves keeps its fixed range.
+inline std::pair<double, double> Observations::fitted_range(std::vector<double> values,
+                                                            std::size_t i, double headroom) const {
+  std::ranges::sort(values);
+  auto [low, high] = widened(values.front(), values.back(), headroom);
   if (!config_.adaptive) return {low, high};
-  const std::size_t n_rare = seen.size() / kRare;
-  const double first = seen[n_rare], last = seen[seen.size() - 1 - n_rare];
+  const std::size_t n_rare = values.size() / kRare;
+  const double first = values[n_rare], last = values[values.size() - 1 - n_rare];
   if (const auto bounds = fixed_range(i)) std::tie(low, high) = *bounds;
   if (!(last > first)) return {low, high};
   const auto [wide_low, wide_high] = widened(first, last, headroom);

@@ -30,7 +30,7 @@ namespace sdnn::agents::detail {
 /// learn from every reward; see FuzzyQLearning.
 class FuzzyDimension {
  public:
-  /// Smaller eligibilities count as 0.
+  /// Smaller eligibilities count as 0 (chosen).
   static constexpr double kForgottenTrace = 1e-3;
 
   /// Throws std::invalid_argument naming the field that is out of range; std::length_error if the
@@ -69,6 +69,7 @@ class FuzzyDimension {
     return !episode.picked.empty() && std::ranges::equal(state, episode.state);
   }
 
+  /// Begins an episode: resets its number of steps and ends its traces.
   void begin_episode(std::size_t environment) {
     Episode& episode = episodes_.of(environment);
     episode.step = 0;
@@ -84,14 +85,13 @@ class FuzzyDimension {
     episode.picked.clear();
     episode.action = clamped_mean(episode.fired, [&](std::size_t i) {
       return episode.picked.emplace_back(
-          policy_.select(rules_.values(episode.fired.rules[i]), episode.step, true));
+          policy_.select(rules_.values(episode.fired.rules[i]), episode.step));
     });
     ++episode.step;
     return episode.action;
   }
 
-  /// Returns the weighted mean of the best actions of the rules that fired; `ties` draws among
-  /// several best actions of a rule.
+  /// Returns the weighted mean of the best actions of the rules that fired; `ties` breaks ties.
   double best_of(const approximators::FiredRules& fired, core::Random& ties) const {
     return clamped_mean(fired, [&](std::size_t i) {
       return policy_.best_action(rules_.values(fired.rules[i]), ties);
@@ -121,7 +121,8 @@ class FuzzyDimension {
       return rules_.value(episode.fired.rules[i], episode.picked[i]);
     });
     const double step = config_.learning_coefficient * (target - value_of_picks);
-    const bool is_large = !(std::abs(step) < kLargeStep);  // only then traces may be restored
+    // Only a large step can fail and needs a copy of the traces, which allocates, to restore them.
+    const bool is_large = !(std::abs(step) < kLargeStep);
     const std::vector<Trace> before = is_large ? episode.traces : std::vector<Trace>();
     renew_traces(episode);
     for (const Trace& trace : episode.traces) {
@@ -148,6 +149,7 @@ class FuzzyDimension {
   }
 
  private:
+  /// The eligibility of a rule's action; those without a trace have the eligibility 0.
   struct Trace {
     std::size_t rule, action;
     double eligibility;
@@ -167,13 +169,14 @@ class FuzzyDimension {
 
   /// The state of the present episode in one environment.
   struct Episode {
-    std::vector<double> state;  ///< of the last exploring act, with all below
+    // The last exploring act: its state, the rules that fired, their picks, the mean of these.
+    std::vector<double> state;
     approximators::FiredRules fired;
     std::vector<std::size_t> picked;
     double action = 0.0;
-    std::vector<Trace> traces;
-    double trace_dt = 1.0;  ///< the time by which the traces have still to fade
-    int step = 0;
+    std::vector<Trace> traces;  ///< the oldest first
+    double trace_dt = 1.0;      ///< the time by which the traces must fade in the next transition
+    int step = 0;               ///< the number of the next exploring act in the episode
   };
 
   static void end_traces(Episode& episode) noexcept {
@@ -261,10 +264,10 @@ class FuzzyDimension {
 
   static constexpr double kSlowestFading = 0.99;  // limits the memory for traces
   static constexpr double kLargest = std::numeric_limits<float>::max();
-  /// A smaller step is less than half the distance of floats near kLargest, so it cannot exceed it.
+  /// A smaller step is below half the distance of floats near kLargest: rounding ignores it there.
   static constexpr double kLargeStep = 1e28;
 
-  // sum value(i) alpha_i / sum alpha_i over the fired rules i, in their order.
+  /// Returns sum value(i) alpha_i / sum alpha_i over the fired rules, with the truth values alpha.
   template <class Value>
   static double mean_over(const approximators::FiredRules& fired, Value&& value) {
     double weighted = 0.0, total = 0.0;
@@ -275,16 +278,17 @@ class FuzzyDimension {
     return weighted / total;
   }
 
-  /// The mean over the fired rules of the actions pick(i).
+  /// The mean of the actions pick(i) over the fired rules i, clipped, as rounding may exceed 1.
   template <class Pick>
   double clamped_mean(const approximators::FiredRules& fired, const Pick& pick) const {
     return std::clamp(mean_over(fired, [&](std::size_t i) { return actions_[pick(i)]; }), -1.0,
                       1.0);
   }
 
+  /// The factor of the traces in a transition of one usual step.
   double fading() const noexcept { return config_.discount * config_.trace_decay; }
 
-  // Steps after which the largest possible eligibility, 1 / (1 - fading), is forgotten.
+  /// Steps after which the largest possible eligibility, 1 / (1 - fading), is forgotten.
   std::size_t trace_lifetime() const noexcept {
     if (fading() == 0.0) return 0;
     return static_cast<std::size_t>(
@@ -293,12 +297,13 @@ class FuzzyDimension {
 
   std::size_t most_traces() const noexcept { return (trace_lifetime() + 1) * rules_.max_fired(); }
 
+  /// The value of a trace's rule and action after a step of learning.
   double moved(const Trace& trace, double step) const noexcept {
     return static_cast<double>(rules_.value(trace.rule, trace.action)) + step * trace.eligibility;
   }
 
-  // Fades the old traces and adds those of the picks, which are of different rules. After short
-  // transitions there may be more traces than there is room for: the oldest are forgotten.
+  /// Fades the old traces and adds the truth values of the picks, each of another rule. After short
+  /// transitions there may be more traces than there is room for; then the oldest are forgotten.
   void renew_traces(Episode& episode) {
     std::vector<Trace>& traces = episode.traces;
     const double faded = discount_over(config_.discount, episode.trace_dt) * config_.trace_decay;

@@ -21,8 +21,8 @@ void move_to_mean(const Actions& actions, const Agent& agent, std::vector<double
   }
 }
 
-/// Writes an agent's greedy action, in the units of the task, into a controller's workspace; `read`
-/// is the agent's workspace with the state.
+/// Writes a greedy action, in units of the task, into a controller's workspace. `read` is the
+/// agent's workspace with the state.
 template <class Agent, class Action, class Workspace, class Read>
 void take_greedy(const Actions& actions, const Agent& agent, const Action& action,
                  Workspace& workspace, const Read& read) {

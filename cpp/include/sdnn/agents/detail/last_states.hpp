@@ -11,20 +11,21 @@
 #include <utility>
 #include <vector>
 
+#include "sdnn/agents/episodes.hpp"
 #include "sdnn/agents/history.hpp"
 #include "sdnn/agents/observations.hpp"
 #include "sdnn/core/detail/check.hpp"
 
 namespace sdnn::agents::detail {
 
-/// A state of an episode, and what belongs to it.
+/// The last state of an episode.
 struct LastState {
   std::vector<double> observation = {}, state = {};
-  bool is_noted = false;  ///< whether ranges have followed it
+  bool is_noted = false;  ///< whether the observation has updated running ranges
   HistoryFilter::Memory memory = {};
-  std::vector<double> action = {};  ///< in that state; empty: none yet
+  std::vector<double> action = {};  ///< taken in the state; empty: none yet
 
-  /// Makes it empty, and keeps the memory that was allocated.
+  /// Empties all members, and keeps their allocated memory.
   void clear() noexcept {
     for (std::vector<double>* values : {&observation, &state, &memory, &action}) values->clear();
     is_noted = false;
@@ -39,7 +40,7 @@ struct LastState {
 /// which start as a copy of the learned episode's and are dropped when that continues.
 class LastStates {
  public:
-  /// Memory in which a state is computed.
+  /// Memory in which a state is computed, so that a step allocates nothing.
   struct Room {
     LastState next = {};
     std::vector<double> inputs = {};
@@ -61,15 +62,15 @@ class LastStates {
     last_.clear();
   }
 
-  /// Computes the state of an observation in which an agent acts; `keep` and `note_action` may
-  /// follow. Throws std::invalid_argument for an unusable observation.
+  /// Writes the state in which an agent acts, in a learned or greedy episode. `keep` and then
+  /// `note_action` may follow. Throws std::invalid_argument for an unusable observation.
   void read(const Observations& observations, std::size_t environment,
             std::span<const double> observation, std::span<double> state, bool is_learned) {
     if (!remembers(observations)) return observations.scale(observation, state);
     find(observations, last(environment, !is_learned), observation, next_, room_);
     std::ranges::copy(next_.state, state.begin());
   }
-  /// Keeps the state that was read last.
+  /// Keeps the state that `read` computed last.
   void keep(const Observations& observations, std::size_t environment, bool is_learned) {
     const bool is_kept = !history_.is_none() || (is_learned && observations.is_running());
     if (!is_kept || environment >= kMostEnvironments) return;
@@ -85,9 +86,9 @@ class LastStates {
       (is_learned ? kept.learned : kept.greedy).action.assign(action.begin(), action.end());
     }
   }
-  /// Computes the state of an observation in a greedy episode, and keeps nothing. The observation
-  /// is the last one, whose state is returned unchanged, or that of the next step. Many threads may
-  /// call it at once, with a separate `room`.
+  /// Writes the state of an observation in a greedy episode, and keeps nothing. The observation is
+  /// the last one, whose kept state is written, or that of the next step. Threads may call it at
+  /// once, with a `room` each.
   void peek(const Observations& observations, std::size_t environment,
             std::span<const double> observation, std::span<double> state, Room& room) const {
     if (history_.is_none()) return observations.scale(observation, state);
@@ -100,8 +101,8 @@ class LastStates {
     std::ranges::copy(room.next.state, state.begin());
   }
 
-  /// Computes the state in which a transition starts; `follow` may be called next. Throws
-  /// std::invalid_argument for an unusable observation.
+  /// Writes the state in which a transition starts; `follow` writes the one in which it ends.
+  /// Throws std::invalid_argument for an unusable observation.
   void start(const Observations& observations, std::size_t environment,
              std::span<const double> observation, std::span<double> state) {
     if (!remembers(observations)) return observations.scale(observation, state);
@@ -113,9 +114,9 @@ class LastStates {
     }
     std::ranges::copy(first_.state, state.begin());
   }
-  /// Computes the state in which the transition ends. Running ranges are updated by each
-  /// observation once, except in a replay. Throws std::invalid_argument for an unusable
-  /// observation.
+  /// Writes the state in which the transition of `start` ends, and keeps it as the last one.
+  /// Running ranges are updated by each observation once, but not in a replay of the warm-up, whose
+  /// observations they were fitted to. Throws std::invalid_argument for an unusable observation.
   void follow(Observations& observations, std::size_t environment, std::span<const double> action,
               std::span<const double> next_observation, std::span<double> next_state,
               bool is_replayed = false) {
@@ -137,12 +138,13 @@ class LastStates {
     kept.is_greedy = false;
   }
 
+  /// Forgets the episodes of an environment.
   void forget(std::size_t environment) {
     if (environment >= last_.size()) return;
     last_[environment].learned.clear();
     last_[environment].is_greedy = false;
   }
-  /// Forgets greedy episodes: the next one begins with its first observation.
+  /// Begins a greedy episode without the memory of another.
   void forget_greedy(std::size_t environment) {
     if (history_.is_none()) return;
     of(environment).greedy.clear();
@@ -176,10 +178,8 @@ class LastStates {
  private:
   struct Environment {
     LastState learned = {}, greedy = {};
-    bool is_greedy = false;  ///< whether greedy episodes have a memory apart
+    bool is_greedy = false;  ///< whether greedy episodes use the memory `greedy`
   };
-
-  static constexpr std::uint64_t kMostEnvironments = 1 << 14;
 
   /// Whether states depend on more than one observation.
   bool remembers(const Observations& observations) const noexcept {
@@ -189,14 +189,14 @@ class LastStates {
     if (last_.size() <= environment) last_.resize(environment + 1);
     return last_[environment];
   }
-  /// The last state of an unfinished episode, or null.
+  /// The last state of an environment's present episode, or null if there is none.
   const LastState* last(std::size_t environment, bool is_greedy) const {
     if (environment >= last_.size()) return nullptr;
     const Environment& kept = last_[environment];
     const LastState& last = is_greedy && kept.is_greedy ? kept.greedy : kept.learned;
     return last.state.empty() ? nullptr : &last;
   }
-  /// Whether this is the observation of a state; missing readings are alike.
+  /// Whether this is the observation of a state. Missing readings, NaN or infinite, are equal.
   static bool is_observation_of(const LastState& last, std::span<const double> observation) {
     const auto are_alike = [](double x, double y) {
       return x == y || (!std::isfinite(x) && !std::isfinite(y));
@@ -236,7 +236,7 @@ class LastStates {
     next.memory = before.memory;
     history_.follow(action, room.inputs, next.memory, next.state, room.history);
   }
-  /// Makes room for the state of an observation.
+  /// Stores the observation, and makes room for its state.
   void prepare(std::span<const double> observation, LastState& next) const {
     next.clear();
     next.observation.assign(observation.begin(), observation.end());
@@ -253,11 +253,10 @@ class LastStates {
       archive.numbers("action", last.action);
     }
     if constexpr (std::remove_cvref_t<decltype(archive)>::kReads) {
-      const auto is_unit = [](double x) { return x >= 0.0 && x <= 1.0; };
       const bool is_empty = last.observation.empty() && last.state.empty() && last.memory.empty();
       const bool is_whole = last.observation.size() == n_variables_ &&
                             last.state.size() == history_.n_inputs() && history_.fits(last.memory);
-      archive.expect(is_empty || (is_whole && std::ranges::all_of(last.state, is_unit)), "state",
+      archive.expect(is_empty || (is_whole && core::are_unit_values(last.state)), "state",
                      "a state in [0, 1] for an observation, or empty");
       archive.expect((last.action.empty() || last.action.size() == n_dimensions_) &&
                          core::are_finite(last.action),
@@ -268,7 +267,7 @@ class LastStates {
   std::size_t n_variables_ = 0, n_dimensions_ = 0;
   HistoryFilter history_;
   std::vector<Environment> last_;
-  LastState first_, next_;  ///< of the transition or the state that is being found
+  LastState first_, next_;  ///< the ends of the present transition; next_ also what `read` computed
   Room room_;
 };
 

@@ -10,9 +10,9 @@
 
 namespace sdnn::agents::detail {
 
-/// Returns the weights, shape (n_features, n_targets), that fit n rows of features to n rows of
-/// targets by least squares, with a ridge of a millionth of the largest diagonal entry. Requires
-/// that n > 0 divides the sizes.
+/// Returns the weights W, shape (n_features, n_targets), with the smallest squared error of
+/// features W = targets, in n rows each. A ridge of a millionth of the largest diagonal entry keeps
+/// the normal equations solvable. Requires that n > 0 divides the sizes of both lists.
 ///
 /// Source: the normal equations, by a Cholesky decomposition; Golub, G., Van Loan, C. (1996), 4.2.
 inline std::vector<double> least_squares(const std::vector<double>& features,

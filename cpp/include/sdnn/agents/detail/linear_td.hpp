@@ -16,11 +16,18 @@
 
 namespace sdnn::agents::detail {
 
-/// Temporal-difference learning of a linear readout. An episode has a trace, a workspace for its
-/// present state, old_value, the Q_old of true-online TD, and the durations of two transitions: dt
-/// of the present one, whose error is learned, and trace_dt of the one before, which the trace has
-/// still to decay by. All numbers are integers: gamma in units of 2^-15, gamma * lambda in units of
-/// 2^-13, values in the readout's unit.
+/// Temporal-difference learning of a linear readout. An `Episode` has the members
+///
+/// | member    | meaning                                                                      |
+/// |-----------|------------------------------------------------------------------------------|
+/// | trace     | the eligibility trace of each weight                                         |
+/// | present   | a workspace of the readout with the state whose value is corrected           |
+/// | old_value | Q_old of true-online TD, in the readout's units                              |
+/// | dt        | the duration of the transition whose error is learned                        |
+/// | trace_dt  | the duration of the transition before, by which the trace must decay first   |
+///
+/// All numbers are integers: gamma in units of 2^-15, gamma * lambda in units of 2^-13, values in
+/// the readout's unit.
 ///
 /// In a transition of dt usual steps gamma is gamma^dt (semi-Markov), in the error as in the decay
 /// of the trace. Lambda is not raised to a power: it says how far targets bootstrap at a decision,
@@ -34,7 +41,8 @@ class LinearTD {
   using Readout = approximators::LinearSDNN;
   using Action = std::span<const std::size_t>;
 
-  /// The parts of a step: r + gamma Q' - Q and Q - Q_old, in units.
+  /// An error, r + gamma Q' - Q, and the drift Q - Q_old of the present value since it was computed
+  /// as the next one; in the readout's units.
   struct Error {
     std::int64_t error, drift;
   };
@@ -53,13 +61,13 @@ class LinearTD {
     return episode.trace_dt == 1.0 ? usual_decay_ : decay_of(episode.trace_dt);
   }
 
-  /// Makes the unit large enough for a reward.
+  /// Doubles the readout's unit until a reward fits.
   void fit_unit(double reward, Episodes<Episode>& episodes) {
     halve_old_values(readout_.fit_unit(reward), episodes);
   }
 
-  /// Returns the value that `compute` computes, after doubling the readout's unit until the value
-  /// fits; `other` is a value in units that is converted, too.
+  /// Returns the value in units that `compute` computes, after doubling the readout's unit until
+  /// the value fits. `other` is another value in units, which is converted with each doubling.
   template <class Compute>
   std::int64_t in_range(Episodes<Episode>& episodes, const Compute& compute,
                         std::int64_t* other = nullptr) {
@@ -87,8 +95,7 @@ class LinearTD {
     return {target - value, drift};
   }
 
-  /// Learns the error at a rate, in units of 1 / kRateOne, after which the present transition is
-  /// the one before.
+  /// Learns the error at a rate in units of 1 / kRateOne, and makes its transition the one before.
   void correct(Episode& episode, Episodes<Episode>& episodes, Action action, Error error,
                std::int32_t rate, bool is_dutch) {
     const int n_doubled = readout_.learn(episode.present.code(), action, episode.trace,
@@ -107,33 +114,39 @@ class LinearTD {
     halve_old_values(readout_.move_rows(episode.present.code(), errors, rate), episodes);
   }
 
-  /// Makes the unit of values smaller, and thus more precise, in two cases: if no weight needs its
-  /// 8 upper bits; or if values 1,024 times the largest possible sum of recent rewards would still
-  /// fit, and then larger weights are clipped. The arguments are sizes of RewardScale, that of the
-  /// last window and the recent one.
+  /// Makes the unit of values smaller, and thus more precise, by the larger of two numbers of bits:
+  /// - those that neither weights nor the rewards of the last window use, minus 8 bits for growth;
+  /// - those by which the unit is too large for the recent rewards. It is small enough if values of
+  ///   1,024 times their largest possible discounted sum just fit. Larger weights, which can only
+  ///   be left over from larger rewards, are clipped then.
+  ///
+  /// The sizes, of the last window and the recent one, are those of RewardScale: powers of 2.
   void refine_unit(std::int32_t size_in_window, std::int32_t size, Episodes<Episode>& episodes) {
     if (!readout_.exponent()) return;
     const std::int32_t exponent = *readout_.exponent();
     const std::int64_t n_weights = readout_.n_weights_of(episodes.of(0).present.code());
-    // A sum of rewards is at most reward / (1 - gamma); `rest` is 1 - gamma. Sizes are exponents.
-    const std::int64_t rest = std::max<std::int64_t>(kDiscountOne - usual_discount_, 1);
-    const int least_bits =
-        Readout::most_bits_of(n_weights) - (kDiscountBits - floor_log2(rest)) - kImplausibleBits;
-    const int n_free =
+    // A reward of s bits in the unit is below 2^s units. A discounted sum of rewards is at most
+    // reward / (1 - gamma), which has `bits_of_sum` more bits.
+    const std::int64_t one_minus_gamma = std::max<std::int64_t>(kDiscountOne - usual_discount_, 1);
+    const int bits_of_sum =
+        kDiscountBits + 1 - std::bit_width(static_cast<std::uint64_t>(one_minus_gamma));
+    const int most_bits = Readout::most_bits_of(n_weights) - bits_of_sum - kImplausibleBits;
+    const int n_unused =
         std::min(readout_.spare_bits(), 30 - (size_in_window - exponent)) - kRoomBits;
-    const int n_lacking = least_bits - (size - exponent);
-    const int n_refined = readout_.refine_unit(std::max({n_free, n_lacking, 0}));
-    for (std::size_t i = 0; i < episodes.size(); ++i) {
-      std::int64_t& old_value = episodes.of(i).old_value;
-      old_value = Readout::refined(old_value, n_refined);
+    const int n_too_coarse = most_bits - (size - exponent);
+    const int n_refined = readout_.refine_unit(std::max({n_unused, n_too_coarse, 0}));
+    for (Episode& episode : episodes) {
+      episode.old_value = Readout::refined(episode.old_value, n_refined);
     }
   }
 
  private:
   static constexpr int kDiscountBits = 15;
   static constexpr std::int64_t kDiscountOne = std::int64_t{1} << kDiscountBits;
-  static constexpr int kRoomBits = 8;          ///< that a smaller unit leaves for larger weights
-  static constexpr int kImplausibleBits = 10;  ///< of 1,024 times the largest plausible value
+  // Chosen constants of refine_unit.
+  static constexpr int kRoomBits = 8;  ///< bits that stay unused, for growth of weights
+  static constexpr int kImplausibleBits =
+      10;  ///< values 2^10 times the largest sum are implausible
 
   std::int64_t discount_of(double dt) const noexcept {
     return std::lround(discount_over(discount_, dt) * static_cast<double>(kDiscountOne));
@@ -142,22 +155,18 @@ class LinearTD {
     return static_cast<std::int32_t>(
         std::lround(discount_over(discount_, dt) * trace_decay_ * approximators::kDecayOne));
   }
-  static int floor_log2(std::int64_t x) noexcept {
-    return static_cast<int>(std::bit_width(static_cast<std::uint64_t>(x))) - 1;
-  }
   /// Halves the stored values once for each doubling of the unit.
   void halve_old_values(int n_doubled, Episodes<Episode>& episodes) {
     for (; n_doubled > 0; --n_doubled) {
-      for (std::size_t i = 0; i < episodes.size(); ++i) {
-        std::int64_t& old_value = episodes.of(i).old_value;
-        old_value = approximators::halved(old_value);
+      for (Episode& episode : episodes) {
+        episode.old_value = approximators::halved(episode.old_value);
       }
     }
   }
 
   Readout readout_;
   double discount_, trace_decay_;
-  std::int64_t usual_discount_;
+  std::int64_t usual_discount_;  ///< of transitions with dt = 1
   std::int32_t usual_decay_;
 };
 

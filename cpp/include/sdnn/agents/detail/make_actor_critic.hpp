@@ -55,8 +55,7 @@ inline double n_rows_of(const std::vector<std::size_t>& n_actions) {
 }
 
 /// Makes an actor-critic, which ignores action_window and averaging_interval. Throws
-/// std::invalid_argument naming an impossible field, and std::length_error for a critic or an actor
-/// that is too large.
+/// std::invalid_argument naming a field, and std::length_error if a part is too large.
 inline ActorCritic make_actor_critic(approximators::LinearSDNNConfig config,
                                      const ActorCriticConfig& learning,
                                      const std::vector<std::size_t>& n_actions,

@@ -1,4 +1,4 @@
-/// Estimates of what noisy sensors observe, from a model of how observations follow each other.
+/// Estimates of the inputs that noisy sensors observe, by a model of how they change.
 #pragma once
 
 #include <algorithm>
@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <span>
 #include <utility>
 #include <vector>
@@ -19,11 +20,13 @@
 
 namespace sdnn::agents::detail {
 
-/// An observer that estimates inputs from noisy observations. It predicts the change of each input
-/// by least squares from the inputs (of angles, cosine and sine) and the action. Each estimate then
-/// moves from its prediction towards the observation by a constant share, the gain: the one of
-/// eight candidates with the smallest prediction errors in the experience, so it is 1 for exact
-/// sensors. `refine` replaces it by gains of a Kalman filter, where each error moves all estimates.
+/// An observer that estimates inputs from noisy observations. In each step it predicts the change
+/// of each input by a linear model, fitted by least squares, of the estimates (of angles, their
+/// cosine and sine) and the action. Then it moves each estimate from its prediction towards the
+/// observation by a constant share, the gain: of eight candidates the one with the smallest
+/// prediction errors in the experience, which is 1 for exact sensors. `refine` replaces the gain by
+/// those of a Kalman filter, a gain for each pair of inputs, by which each error moves all
+/// estimates.
 ///
 /// Estimates are in coordinates of the model: angles in radians, other inputs in standard
 /// deviations from their mean.
@@ -37,44 +40,44 @@ class Observer {
   static constexpr std::size_t kFewestTransitions = 100;
 
   Observer() = default;
-  /// Fits a linear model of changes, and the gain with which its predictions are corrected.
-  /// Requires inputs and transitions within the limits above.
+  /// Fits the linear model and the gain. Requires inputs and transitions within the limits above.
   explicit Observer(const RandomExperience& experience) : circular_(experience.circular) {
     find_scale(experience);
     find_actions(experience);
     const Series series = coordinates_of(experience);
     std::vector<double> estimates = series.observed;
-    double least = 0.0;
+    double least_error = std::numeric_limits<double>::infinity();
+    double error_without = 0.0;
     for (int round = 0; round < kRounds; ++round) {
-      Observer next = *this;
-      next.fit_weights(series, estimates);
+      Observer candidate = *this;
+      candidate.fit_weights(series, estimates);
       for (const double gain : kGains) {
-        next.set_gain(gain);
-        const double error = next.log_error(series);
-        if (round == 0 && gain == 1.0) log_error_without_ = error;
-        if ((round > 0 || gain < 1.0) && error >= least) continue;
-        least = error;
-        next.log_error_without_ = log_error_without_;
-        *this = next;
+        candidate.set_gain(gain);
+        const double error = candidate.log_error(series);
+        if (round == 0 && gain == 1.0) error_without = error;
+        if (error >= least_error) continue;
+        least_error = error;
+        *this = candidate;
       }
       estimates = estimates_of(series);
     }
-    log_error_ = least;
+    log_error_ = least_error;
+    log_error_without_ = error_without;
     find_range(estimates);
   }
 
   std::size_t n_inputs() const noexcept { return circular_.size(); }
-  /// How far the estimate of the first input moves by its own error.
+  /// The gain of the first input by its own error; after the constructor, of all inputs.
   double gain() const noexcept { return gains_.empty() ? 1.0 : gains_.front(); }
-  /// The decrease of the mean logarithm of squared prediction errors if estimates replace inputs.
+  /// How much the mean logarithm of squared prediction errors falls if estimates replace inputs.
   double improvement() const noexcept {
     return (log_error_without_ - log_error_) / static_cast<double>(n_inputs());
   }
 
-  /// Fits a gain for each pair of inputs, and the model anew: noise in its features, which
-  /// predictions from earlier observations do not share, would make it underestimate their effect.
-  /// Fitted to a random policy, models are wrong elsewhere, so gains have a least size. Requires
-  /// the experience of the constructor.
+  /// Fits a gain for each pair of inputs, and the model anew, by instrumental variables: noise in
+  /// the observed features makes a plain fit underestimate their effect. Fitted to a random policy,
+  /// models are wrong elsewhere, so kDrifts keeps gains from being too small. Takes the
+  /// constructor's experience.
   void refine(const RandomExperience& experience);
 
   /// The estimates of an episode's first state. Shapes: (n_inputs,).
@@ -104,17 +107,18 @@ class Observer {
     }
   }
 
-  /// Returns the share of an input's squared changes that the last changes explain in addition to
-  /// the present state and action, with or without products of two of these, for the input with the
-  /// largest share. Each half of the experience is explained by a fit to the other one, and the
-  /// smaller of both shares counts. An input counts only if 70 % of its squared changes are
-  /// explained then: a hidden velocity explains nearly all, while the last changes also stand in
-  /// for products of three inputs, which the model lacks. Returns 0 where there would be too many
-  /// products to fit.
+  /// Returns which share of an input's squared changes the last changes of all inputs explain,
+  /// beyond the share that a fit to the present state, the action and their products of two
+  /// explains. The input with the largest share counts. Such a share is evidence of a velocity that
+  /// is not observed.
+  ///
+  /// A fit to each half of the experience explains the other half, and the smaller share counts. An
+  /// input counts only if 70 % of its squared changes are explained with the last changes: a hidden
+  /// velocity explains nearly all, while last changes can also stand in for products of three
+  /// inputs, which the fit lacks. Returns 0 with too many products or few transitions.
   double share_of_last_changes(const RandomExperience& experience) const;
 
-  /// Lists the members that are saved and restored; see core/state.hpp. Which inputs are angles is
-  /// known from the task.
+  /// Lists the saved members; see core/state.hpp. Which inputs are angles is known from the task.
   template <class Self, class Archive>
   static void serialize(Self& self, Archive& archive) {
     archive.numbers("means", self.means_);
@@ -154,13 +158,15 @@ class Observer {
 
   /// Candidates from exact to very noisy sensors, each about 0.7 times the one before.
   static constexpr double kGains[] = {1.0, 0.7, 0.5, 0.35, 0.25, 0.175, 0.125, 0.09};
-  static constexpr double kDrifts[] = {3.0, 1.0, 0.3, 0.1, 0.03};  // in variances of the noise
-  static constexpr int kRounds = 3;       // fits, each to the last one's estimates
-  static constexpr int kRefinements = 4;  // gains of a model, then a model by their estimates
-  static constexpr std::size_t kMostTransitions = 20'000;       // limits the time of a fit
+  /// Candidates for the variance of the model's own errors, in variances of the sensors' noise.
+  static constexpr double kDrifts[] = {3.0, 1.0, 0.3, 0.1, 0.03};
+  // Chosen constants.
+  static constexpr int kRounds = 3;       // fits of a model to the estimates of the model before
+  static constexpr int kRefinements = 4;  // fits of gains to the model, then of the model to these
+  static constexpr std::size_t kMostTransitions = 20'000;       // that are used, to limit the time
   static constexpr std::size_t kMostLevels = 8;                 // more actions count as a number
-  static constexpr std::size_t kMostFeaturesWithProducts = 17;  // 17 * 18 / 2 = 153 products
-  static constexpr double kLeastExplained = 0.7;                // share, see share_of_last_changes
+  static constexpr std::size_t kMostFeaturesWithProducts = 17;  // 153 with 16 * 17 / 2 products
+  static constexpr double kLeastExplained = 0.7;                // see share_of_last_changes
   static constexpr double kFarthest = 6.0;       // of estimates from the mean, in deviations
   static constexpr double kLargestChange = 3.0;  // of an estimate in a step, in deviations
   static constexpr double kLeastError = 1e-6;    // added to squares, so that logarithms are finite
@@ -198,8 +204,8 @@ class Observer {
     }
   }
 
-  /// Fits the ranges of the estimates, with a quarter of their width added at each end. Estimates
-  /// need ranges of their own because they vary less than noisy observations.
+  /// Fits the ranges of the estimates, with a quarter of their width added at each end. They are
+  /// not the ranges of the observations, because estimates vary less than noisy observations.
   void find_range(const std::vector<double>& estimates) {
     low_.assign(n_inputs(), kFarthest);
     high_.assign(n_inputs(), -kFarthest);
@@ -215,8 +221,9 @@ class Observer {
     }
   }
 
-  /// Decides how actions become features: by an indicator for each, or by their number if many
-  /// differ.
+  /// Decides how actions become features: by an indicator for each of up to kMostLevels different
+  /// actions, or else by the number minus the middle of all. In the first case levels_ has all
+  /// actions but the last, whose indicator would follow from the others; in the second the middle.
   void find_actions(const RandomExperience& experience) {
     for (const std::vector<double>& actions : experience.actions) {
       std::vector<double> levels = actions;
@@ -226,7 +233,7 @@ class Observer {
       n_levels_.push_back(static_cast<std::int32_t>(levels.size()));
       levels_.insert(levels_.end(), levels.begin(), levels.end());
       if (levels.size() == 1) continue;
-      levels_.pop_back();  // the last one follows from the others
+      levels_.pop_back();
       --n_levels_.back();
     }
   }
@@ -272,7 +279,7 @@ class Observer {
       first += n;
     }
   }
-  /// Moves estimates to what is expected after an action.
+  /// Moves estimates to the predicted ones after an action.
   void predict(std::span<const double> action, std::span<double> estimates,
                std::vector<double>& features) const {
     find_features(action, estimates, features);
@@ -306,15 +313,10 @@ class Observer {
     }
   }
 
-  /// The mean linear model of the next state, shape (n_inputs, n_inputs).
   std::vector<double> transition(const Series& series) const;
-
-  /// Fits weights by two-stage least squares: features of observations, which have noise, are
-  /// replaced by what features of predictions explain of them.
   std::vector<double> instrumental_weights(const Series& series) const;
 
-  /// Fits the model of changes, by least squares, to the changes from the estimates to the next
-  /// observations.
+  /// Fits the model, by least squares, to the changes from the estimates to the next observations.
   void fit_weights(const Series& series, const std::vector<double>& estimates) {
     std::vector<double> features, changes, row;
     for (std::size_t t = 0; t < series.size(); ++t) {
@@ -328,8 +330,8 @@ class Observer {
     weights_ = least_squares(features, changes, series.size());
   }
 
-  /// Runs the observer over a series. It calls `with(estimates)` before every transition, then
-  /// `error(i, difference)` with the error of the prediction of each input i.
+  /// Runs the observer over a series. Calls `with(estimates)` before each transition, then
+  /// `error(i, difference)` for each input i, with the next observation minus its prediction.
   void run(const Series& series, const auto& with, const auto& error) const {
     std::vector<double> estimates(n_inputs()), errors(n_inputs()), features;
     for (std::size_t t = 0; t < series.size(); ++t) {
@@ -359,19 +361,17 @@ class Observer {
     std::vector<double> squares(n_inputs());
     run(
         series, [](const auto&) {},
-        [&](std::size_t i, double surprise) { squares[i] += surprise * surprise; });
+        [&](std::size_t i, double error) { squares[i] += error * error; });
     for (double& square : squares) square /= static_cast<double>(series.size());
     return squares;
   }
+  /// The sum over inputs of the logarithm of the mean squared error of predictions.
   double log_error(const Series& series) const {
     double sum = 0.0;
     for (const double square : mean_squares(series)) sum += core::log(square + kLeastError);
     return sum;
   }
 
-  /// Returns for each input the share of squared changes that a linear model of the features
-  /// explains in one half of the transitions, if it is fitted to the other: to the first half, or
-  /// to the second.
   std::vector<double> explained(const std::vector<double>& features,
                                 const std::vector<double>& changes, bool is_first) const;
   static std::ptrdiff_t offset(std::size_t n) noexcept { return static_cast<std::ptrdiff_t>(n); }
@@ -405,13 +405,16 @@ class Observer {
   }
 
   std::vector<bool> circular_;
-  std::vector<double> means_, deviations_;   ///< of states
-  std::vector<std::int32_t> n_levels_ = {};  ///< of each dimension; 1: an action is a number
-  std::vector<double> levels_ = {};          ///< actions with an indicator, or the zero of a number
-  std::vector<double> weights_ = {};         ///< (n_features, n_inputs)
-  std::vector<double> gains_ = {};           ///< (n_inputs, n_inputs)
+  std::vector<double> means_, deviations_;  ///< of states
+  /// The features of actions, see find_actions: their number in each dimension, and for each the
+  /// action that it indicates or, if it is the only one, the number that is subtracted.
+  std::vector<std::int32_t> n_levels_ = {};
+  std::vector<double> levels_ = {};
+  std::vector<double> weights_ = {};          ///< (n_features, n_inputs)
+  std::vector<double> gains_ = {};            ///< (n_inputs, n_inputs)
   std::vector<double> low_ = {}, high_ = {};  ///< of estimates
-  double log_error_ = 0.0, log_error_without_ = 0.0;
+  double log_error_ = 0.0,
+         log_error_without_ = 0.0;  ///< with estimates, and with observations only
 };
 
 }  // namespace sdnn::agents::detail

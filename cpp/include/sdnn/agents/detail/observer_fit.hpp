@@ -1,4 +1,4 @@
-/// How an observer is refined, and whether the last changes explain the next ones.
+/// Functions of Observer that refine it, and the test whether last changes explain the next ones.
 #pragma once
 
 #include <algorithm>
@@ -14,14 +14,15 @@
 
 namespace sdnn::agents::detail {
 
-/// Searches for better gains and model weights in turns, and keeps those that predict best. The
-/// noise of sensors is half of the error of a model that trusts them.
+/// Fits gains to the model and the model to the gains in turns, and keeps those that predict best.
+/// A model that takes observations for states has the noise of two sensor readings in its errors,
+/// that before and that after the step. Half of its squared errors is the estimate of the noise.
 inline void Observer::refine(const RandomExperience& experience) {
   const Series series = coordinates_of(experience);
   Observer next = *this;
   next.fit_weights(series, series.observed);
   next.set_gain(1.0);
-  std::vector<double> noise = next.mean_squares(series);  // of two sensors each
+  std::vector<double> noise = next.mean_squares(series);
   for (double& square : noise) square = std::max(square, kLeastError) / 2.0;
   for (int round = 0; round < kRefinements; ++round) {
     const std::vector<double> transition = next.transition(series);
@@ -35,8 +36,6 @@ inline void Observer::refine(const RandomExperience& experience) {
   find_range(estimates_of(series));
 }
 
-/// The share of the changes of inputs that only the last changes explain: evidence of hidden
-/// velocities. Each half of the transitions is predicted by a fit to the other one; see the class.
 inline double Observer::share_of_last_changes(const RandomExperience& experience) const {
   const Series series = coordinates_of(experience);
   std::vector<double> with, without, linear, changes, features;
@@ -71,14 +70,14 @@ inline double Observer::share_of_last_changes(const RandomExperience& experience
   return std::ranges::max(shares);
 }
 
-/// The linear model's matrix, from a state to the next one; for angles, linearized at their mean.
+/// Returns the linear model's matrix from a state to the next one, shape (n_inputs, n_inputs).
+/// Angles, whose cosine and sine are features, have their mean slope in the series.
 inline std::vector<double> Observer::transition(const Series& series) const {
   const std::size_t n = n_inputs();
   std::vector<double> matrix(n * n);
   for (std::size_t j = 0, feature = 1; j < n; ++j, ++feature) {
-    double cosine = 1.0, sine = 0.0;  // means; of numbers, the slope of their feature
+    double cosine = 0.0, sine = 0.0;  // means over the series
     if (circular_[j]) {
-      cosine = 0.0;
       for (std::size_t t = 0; t < series.size(); ++t) {
         const core::SinCos turn = core::sin_cos(series.observed[t * n + j]);
         cosine += turn.cos / static_cast<double>(series.size());
@@ -95,17 +94,18 @@ inline std::vector<double> Observer::transition(const Series& series) const {
   return matrix;
 }
 
-/// Fits the model by two-stage least squares, with the predicted states as instruments: noise in
-/// the observations would bias a plain fit.
+/// Fits the model by two-stage least squares. Noise in the observed features would bias a plain
+/// fit. Features of the predicted states do not share this noise: the first stage replaces the
+/// observed features by the part that those explain, the second fits the changes to it.
 inline std::vector<double> Observer::instrumental_weights(const Series& series) const {
   const std::size_t n = n_inputs();
-  std::vector<double> surprises, predicted(n), instruments, features, changes, row;
-  run(series, [](const auto&) {}, [&](std::size_t, double x) { surprises.push_back(x); });
+  std::vector<double> errors, predicted(n), instruments, features, changes, row;
+  run(series, [](const auto&) {}, [&](std::size_t, double error) { errors.push_back(error); });
   for (std::size_t t = 1; t < series.size(); ++t) {
     if (series.begins[t]) continue;
     const auto observed = series.row(series.observed, t), next = series.row(series.next, t);
     for (std::size_t i = 0; i < n; ++i) {
-      predicted[i] = observed[i] - surprises[(t - 1) * n + i];
+      predicted[i] = observed[i] - errors[(t - 1) * n + i];
       changes.push_back(difference(next[i], observed[i], i));
     }
     find_features(series.actions_at(t), predicted, row);
@@ -128,8 +128,8 @@ inline std::vector<double> Observer::instrumental_weights(const Series& series) 
   return least_squares(features, changes, size);
 }
 
-/// The share of each input's squared changes in one half of the data that a fit to the other half
-/// explains.
+/// Returns for each input the share of squared changes that a linear model of the features explains
+/// in one half of the transitions, if it is fitted to the other: to the first half if `is_first`.
 inline std::vector<double> Observer::explained(const std::vector<double>& features,
                                                const std::vector<double>& changes,
                                                bool is_first) const {

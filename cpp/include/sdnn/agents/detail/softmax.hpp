@@ -15,14 +15,15 @@ namespace sdnn::agents::detail {
 
 /// An action's part of a softmax.
 struct SoftmaxTerm {
-  std::uint32_t weight = 0;        ///< exp(h - max h), in units of 2^-30; 0 where it is not allowed
-  std::int32_t probability = 0;    ///< in units of 2^-16
-  std::int32_t entropy_slope = 0;  ///< p (log p + H): minus the entropy's slope, times 2^16
+  std::uint32_t weight = 0;      ///< exp(h - max h), in units of 2^-30; 0 where it is not allowed
+  std::int32_t probability = 0;  ///< in units of 2^-16
+  /// p (ln p + H) in units of 2^-16: minus the derivative of the entropy H by the preference.
+  std::int32_t entropy_slope = 0;
 };
 
-inline constexpr int kExponentBits = 20;  ///< of logarithms to the base 2
+inline constexpr int kExponentBits = 20;  ///< fractional bits of logarithms to the base 2
 
-/// Returns 2^-x, in units of 2^-30, to 5e-6; x in [0, 64) has 20 fractional bits.
+/// Returns 2^-x in units of 2^-30, with an error up to 5e-6; x, below 64, is in units of 2^-20.
 constexpr std::int64_t power_of_half(std::int64_t x) noexcept {
   // Coefficients of a polynomial of degree 4 for 2^-f, f in [0, 1), that is exact at both ends.
   constexpr std::int64_t kCoefficients[] = {7356191, -57204762, 257158220, -744180561, 1 << 30};
@@ -34,7 +35,7 @@ constexpr std::int64_t power_of_half(std::int64_t x) noexcept {
   return power >> (x >> kExponentBits);
 }
 
-/// Returns log2(x / 2^30) with 20 fractional bits, to 1e-4; x is at least 1.
+/// Returns log2(x / 2^30) in units of 2^-20, with an error of 1e-4 at most; x is at least 1.
 constexpr std::int64_t log2_of(std::uint64_t x) noexcept {
   const int exponent = static_cast<int>(std::bit_width(x)) - 1;
   const std::uint64_t mantissa = exponent <= 30 ? x << (30 - exponent) : x >> (exponent - 30);
@@ -48,8 +49,8 @@ constexpr std::int64_t log2_of(std::uint64_t x) noexcept {
   return (std::int64_t{exponent - 30} << kExponentBits) + logarithm;
 }
 
-/// Computes the softmax of preferences, integers in units of 2^-n_unit_bits, n_unit_bits >= 20.
-/// All spans have equal sizes, but `allowed` may be empty. Requires that an action is allowed.
+/// Computes the softmax of preferences, integers in units of 2^-n_unit_bits with n_unit_bits >= 20.
+/// Shapes: (n_actions,) each; `allowed` may be empty. Requires that an action is allowed.
 inline void softmax(std::span<const std::int64_t> preferences, ActionMask allowed, int n_unit_bits,
                     std::span<SoftmaxTerm> terms) noexcept {
   constexpr std::int64_t kLog2E = 1549082005;  // log2(e), in units of 2^-30
@@ -59,6 +60,7 @@ inline void softmax(std::span<const std::int64_t> preferences, ActionMask allowe
   for (std::size_t a = 0; a < terms.size(); ++a) {
     if (allows(allowed, a)) best = std::max(best, preferences[a]);
   }
+  // The binary logarithm of best probability / probability, in units of 2^-20.
   const auto bits_below_best = [&](std::size_t a) {
     const std::int64_t below = (best - preferences[a]) >> (n_unit_bits - kExponentBits);
     return std::min(approximators::scaled(std::min(below, kMostBits), kLog2E, 30), kMostBits);

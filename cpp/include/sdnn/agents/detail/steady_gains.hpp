@@ -12,16 +12,16 @@ namespace sdnn::agents::detail {
 /// Gains are clipped, since those of an unstable model grow without limit.
 inline constexpr double kLargestGain = 100.0;
 
-/// Returns the gains of the steady Kalman filter, shape (n, n): how far each estimate moves by each
-/// error of a prediction. `transition` (n, n) is the linear model of the next state, and sensors
-/// have independent noise of variances `noise` (n,), above 0. The model's own variances are a part
-/// of these, `drift`: the larger it is, the nearer to 1 are the gains.
+/// Returns the gains of the steady Kalman filter, shape (n, n): entry (i, j) is how far estimate i
+/// moves by the error of the prediction of observation j. `transition` (n, n) is the linear model
+/// of the next state. Sensors have independent noise of variances `noise` (n,), above 0; the
+/// model's own errors have `drift` times these variances: the larger, the nearer to 1 are the
+/// gains.
 ///
-/// Source: Kalman, R. (1960); the observations of a state are taken into account one by one, so
-/// that no matrix is inverted.
+/// Source: Kalman, R. (1960); observations are used one by one, so that no matrix is inverted.
 inline std::vector<double> steady_gains(const std::vector<double>& transition,
                                         const std::vector<double>& noise, double drift) {
-  constexpr int kSteps = 100;  // in which gains of a stable model settle
+  constexpr int kSteps = 100;  // enough for the gains of a stable model to settle (chosen)
   const std::size_t n = noise.size();
   std::vector<double> covariance(n * n), product(n * n), column(n);
   for (std::size_t i = 0; i < n; ++i) covariance[i * n + i] = noise[i];
