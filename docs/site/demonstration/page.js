@@ -5,9 +5,14 @@ export async function loadModule(name) {
   const response = await fetch(new URL(name, import.meta.url), { credentials: "same-origin" });
   if (!response.ok) throw new Error(`${name} must be beside this page, got status ${response.status}`);
   const module = await WebAssembly.compile(await response.arrayBuffer());
+  // The environment has no variables: its number of variables and their size are written as 0.
+  const writeZeros = (...addresses) => {
+    for (const address of addresses) new DataView(exports.memory.buffer).setUint32(address, 0);
+    return 0;
+  };
   const imports = {};
   for (const { module: namespace, name: symbol } of WebAssembly.Module.imports(module)) {
-    (imports[namespace] ??= {})[symbol] = () => 0;
+    (imports[namespace] ??= {})[symbol] = symbol === "environ_sizes_get" ? writeZeros : () => 0;
   }
   const { exports } = await WebAssembly.instantiate(module, imports);
   exports._initialize();
