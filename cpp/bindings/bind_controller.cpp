@@ -57,6 +57,13 @@ bool has_other_threads() {
   return PyThreadState_Next(PyInterpreterState_ThreadHead(PyInterpreterState_Get())) != nullptr;
 }
 
+/// Waits until pending changes of a controller, or of its networks, are done. Call it before
+/// anything is read: the controller may be in its warm-up afterwards.
+void wait_for_changes(Controller& controller) {
+  if (controller.is_warming_up()) return;  // there are no networks yet, and nothing reads them
+  bindings::wait_for_changes(controller, bindings::memory_of_parts(controller.agent()));
+}
+
 /// Calls `read`, which reads the controller, while other threads run and may read it, too.
 template <class Read>
 void read_without_gil(Controller& controller, const Read& read) {
@@ -83,6 +90,7 @@ std::span<const double> best_action(Controller& controller, std::span<const doub
 /// The values of all actions of a dimension. Other threads run meanwhile, as in best_action.
 py::array_t<double> values(Controller& controller, const ArrayArgument<double>& observation,
                            std::size_t dimension) {
+  wait_for_changes(controller);
   require_warm(controller);
   core::require_below("dimension", dimension, controller.n_dimensions());
   const auto variables = bindings::copied(bindings::flat(observation));
@@ -323,6 +331,7 @@ void bind_controller(py::module_& module) {
           "act",
           [](Controller& self, const ArrayArgument<double>& observation, bool explore,
              std::size_t environment, const MaskArgument& mask) {
+            if (!explore) wait_for_changes(self);
             const auto variables = bindings::flat(observation);
             const bool is_reader = !explore && has_other_threads() && !self.is_warming_up() &&
                                    environment < self.n_environments();

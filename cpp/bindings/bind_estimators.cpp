@@ -150,6 +150,7 @@ estimators::PerceptronRule perceptron_rule(const ParallelPerceptron& layer,
 Matrix online_potentials_of(const estimators::OnlineLayer& layer, const Bins& bins) {
   const auto values = copied(matrix(bins, "bins", layer.layer().code().n_inputs()));
   return bindings::filled<std::int32_t>({n_rows(bins), layer.layer().n_units()}, [&](auto out) {
+    bindings::wait_for_changes(layer);
     const bindings::WithoutGIL unlocked(layer);
     layer.potentials(values, out);
   });
@@ -195,6 +196,7 @@ void bind_online_layer(py::module_& module) {
       .def(
           "synchronize",
           [](OnlineLayer& self) {
+            bindings::wait_for_changes(self);
             // Readers of its own weights may continue meanwhile.
             const bindings::WithoutGIL unlocked(std::as_const(self), self.layer());
             self.synchronize();

@@ -17,6 +17,8 @@
 #include <utility>
 #include <vector>
 
+#include "sdnn/core/detail/interruption.hpp"
+
 // This function marks the namespaces of the library: argument-dependent lookup finds it for their
 // classes. It is declared once and imported into each namespace, so that lookup is not ambiguous
 // for templates whose arguments are of several namespaces.
@@ -60,25 +62,34 @@ concept LibraryClass =
 template <LibraryClass T, class... Options>
 using Class = pybind11::class_<T, Options...>;
 
-/// Memory that a call reads or changes without the GIL. The GIL guards the list of them.
+/// How a call uses memory: it reads or changes it without the GIL, or waits until it can change it.
+enum class Access { read, change, wait_to_change };
+
+/// Memory that a running call uses, and how. The GIL guards the list of all uses.
 struct Use {
-  const void* owner;
+  const void* owner;  ///< the C++ object whose lifetime is that of the use
   const std::byte* begin;
   const std::byte* end;
-  bool changes;
+  Access access;
+  std::thread::id thread = std::this_thread::get_id();
 
-  /// Describes the use of an object with its members; const ones are not changed.
+  /// Describes the use of an object with its members; const ones are read, others are changed.
   template <class Object>
   static Use of(const void* owner, Object& object) noexcept {
     const auto* const begin = reinterpret_cast<const std::byte*>(&object);
-    return {owner, begin, begin + sizeof(Object), !std::is_const_v<Object>};
+    return {owner, begin, begin + sizeof(Object), access_to<Object>()};
   }
 
   /// Describes the use of parts that an object holds elsewhere.
   template <class Part>
   static Use of(const void* owner, const std::span<Part>& parts) noexcept {
     const auto bytes = std::as_bytes(parts);
-    return {owner, bytes.data(), bytes.data() + bytes.size(), !std::is_const_v<Part>};
+    return {owner, bytes.data(), bytes.data() + bytes.size(), access_to<Part>()};
+  }
+
+  template <class T>
+  static constexpr Access access_to() noexcept {
+    return std::is_const_v<T> ? Access::read : Access::change;
   }
 
   static std::vector<Use>& all() {
@@ -91,11 +102,13 @@ struct Use {
   }
 };
 
-/// Throws std::runtime_error if another call is changing the memory, or is using it while this call
-/// wants to change it.
+/// Throws std::runtime_error if another call is changing the memory, or is reading it while this
+/// call wants to change it. A change that only waits for its turn does not count.
 inline void require_unused(const Use& wanted, const char* name) {
   for (const Use& use : Use::all()) {
-    if ((use.changes || wanted.changes) && use.overlaps(wanted)) {
+    const bool is_conflict = use.access == Access::change ||
+                             (use.access == Access::read && wanted.access == Access::change);
+    if (is_conflict && use.overlaps(wanted)) {
       throw std::runtime_error(std::string("this ") + name +
                                " is in use by a call in another thread: wait for its end");
     }
@@ -123,21 +136,38 @@ class ReleasedGIL {
   PyThreadState* state_;
 };
 
+/// Lists uses during its lifetime. The GIL must be held at its begin and at its end.
+class ListedUses {
+ public:
+  ListedUses(const void* owner, const std::vector<Use>& uses) : owner_(owner) {
+    Use::all().insert(Use::all().end(), uses.begin(), uses.end());
+  }
+  ListedUses(const ListedUses&) = delete;
+  ListedUses& operator=(const ListedUses&) = delete;
+  ~ListedUses() {
+    std::erase_if(Use::all(), [this](const Use& use) { return use.owner == owner_; });
+  }
+
+ private:
+  const void* owner_;
+};
+
 /// Releases the GIL while a call works on objects, so that other threads can run Python.
 ///
 /// Objects passed as const are read, others are changed, including everything stored in them.
 /// During its lifetime any use of a changing object, and any change of an object that is being
-/// read, raises a RuntimeError. Arrays must be copied before: nothing prevents other threads from
-/// changing them.
+/// read, raises a RuntimeError; calls that should wait instead begin with wait_for_readers or
+/// wait_for_changes. Arrays must be copied before: nothing prevents other threads from changing
+/// them.
 class WithoutGIL {
  public:
   /// Throws std::runtime_error if another thread's call is in the way.
   template <class... Object>
-  explicit WithoutGIL(Object&... objects) : uses_(this, {Use::of(this, objects)...}) {}
+  explicit WithoutGIL(Object&... objects) : uses_(this, checked({Use::of(this, objects)...})) {}
   /// Releases the lock for numbers of objects and parts that are known only at run time.
   template <class Object, class Part>
   WithoutGIL(const std::vector<Object*>& objects, const std::vector<std::span<Part>>& parts)
-      : uses_(this, of_all(objects, parts)) {}
+      : uses_(this, checked(of_all(objects, parts))) {}
   WithoutGIL(const WithoutGIL&) = delete;
   WithoutGIL& operator=(const WithoutGIL&) = delete;
 
@@ -152,35 +182,59 @@ class WithoutGIL {
     return uses;
   }
 
-  struct Uses {
-    Uses(const void* owner, const std::vector<Use>& uses) : owner_(owner) {
-      for (const Use& use : uses) require_unused(use, "object");
-      Use::all().insert(Use::all().end(), uses.begin(), uses.end());
-    }
-    Uses(const Uses&) = delete;
-    Uses& operator=(const Uses&) = delete;
-    ~Uses() {
-      std::erase_if(Use::all(), [this](const Use& use) { return use.owner == owner_; });
-    }
+  /// Returns the uses; throws std::runtime_error if another thread's call is in the way.
+  static std::vector<Use> checked(std::vector<Use> uses) {
+    for (const Use& use : uses) require_unused(use, "object");
+    return uses;
+  }
 
-    const void* owner_;
-  };
-
-  Uses uses_;
+  ListedUses uses_;
   ReleasedGIL released_;  // last: the GIL is back before the list changes
 };
 
+/// Lets other threads run until no listed use satisfies `is_in_the_way`. Ctrl-C ends the wait with
+/// the exception of Python's signal handler.
+template <class Condition>
+void wait_while_any(const Condition& is_in_the_way) {
+  while (std::ranges::any_of(Use::all(), is_in_the_way)) {
+    {
+      const ReleasedGIL released;
+      std::this_thread::yield();
+    }
+    core::interruption_point();
+  }
+}
+
 /// Waits until no call in another thread reads the object, so that it can be changed with the GIL
-/// held. Use it only for objects that are read for short times.
+/// held. Meanwhile calls that begin with wait_for_changes do not begin to read: readers without
+/// pause cannot keep a change from its turn. Use it only for objects that are read for short times.
 template <class Object>
 void wait_for_readers(Object& object) {
-  const auto is_reader = [use = Use::of(nullptr, object)](const Use& other) {
-    return !other.changes && other.overlaps(use);
+  Use use = Use::of(&use, object);
+  const auto is_reader = [&use](const Use& other) {
+    return other.access == Access::read && other.overlaps(use);
   };
-  while (std::ranges::any_of(Use::all(), is_reader)) {
-    const ReleasedGIL released;
-    std::this_thread::yield();
-  }
+  if (std::ranges::none_of(Use::all(), is_reader)) return;
+  use.access = Access::wait_to_change;
+  const ListedUses pending(&use, {use});
+  wait_while_any(is_reader);
+}
+
+/// Waits until other threads' pending and running changes of the objects are done. Every call that
+/// reads, without the GIL, objects of wait_for_readers begins with it, as it may find the objects
+/// changed afterwards. A thread that already reads or waits (it runs a signal handler) does not
+/// wait: the pending change may be waiting for that thread, or be its own.
+template <class... Object>
+void wait_for_changes(const Object&... objects) {
+  const auto is_of_this_thread = [](const Use& use) {
+    return use.thread == std::this_thread::get_id();
+  };
+  if (std::ranges::any_of(Use::all(), is_of_this_thread)) return;
+  const Use uses[] = {Use::of(nullptr, objects)...};
+  wait_while_any([&uses](const Use& other) {
+    const auto overlaps = [&other](const Use& use) { return use.overlaps(other); };
+    return other.access != Access::read && std::ranges::any_of(uses, overlaps);
+  });
 }
 
 /// Makes pickling raise TypeError for all classes that do not define it. Otherwise, with pickle's
@@ -204,7 +258,9 @@ inline void require_usable(const pybind11::detail::value_and_holder& held) {
   };
   const auto* const object = static_cast<const std::byte*>(held.value_ptr());
   if (object == nullptr) throw pybind11::type_error(name() + ".__init__() was not called");
-  if (!Use::all().empty()) require_unused({nullptr, object, object + 1, false}, name().c_str());
+  if (!Use::all().empty()) {
+    require_unused({nullptr, object, object + 1, Access::read}, name().c_str());
+  }
 }
 
 }  // namespace sdnn::bindings

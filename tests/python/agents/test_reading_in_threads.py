@@ -1,7 +1,7 @@
 """Several threads read values and greedy actions of one agent at once."""
 
 import threading
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from functools import partial
 
 import gymnasium as gym
@@ -41,18 +41,16 @@ def train(agent, n_steps, seed):
         observation = next_observation
 
 
-def observations_to_read():
-    """Draw 60 observations anew, in which time a learner that waits for readers gets its turn."""
-    return np.random.default_rng(0).random((60, N_INPUTS))
+OBSERVATIONS_TO_READ = np.random.default_rng(0).random((60, N_INPUTS))
 
 
 def read_values(agent):
     values_of = agent.value if isinstance(agent, FuzzyQLearning) else agent.q_values
-    return np.array([values_of(observation) for observation in observations_to_read()])
+    return np.array([values_of(observation) for observation in OBSERVATIONS_TO_READ])
 
 
 def read_greedy_actions(agent):
-    return np.array([agent.act(row, explore=False) for row in observations_to_read()])
+    return np.array([agent.act(row, explore=False) for row in OBSERVATIONS_TO_READ])
 
 
 def run_in_threads(*functions):
@@ -92,3 +90,31 @@ def test_concurrent_readers_do_not_change_learning(name):
     run_in_threads(learn, read_while_it_learns, read_while_it_learns)
     assert states_equal(agent, unread)
     np.testing.assert_array_equal(read_values(agent), read_values(unread))
+
+
+def test_a_learner_gets_its_turns_while_two_threads_read_without_pause():
+    # A pass takes milliseconds, so that at nearly any time one of the two threads is reading.
+    sizes = SIZES.replace(n_pattern_units=100, n_hidden_units=50_000, n_active_units=15_000)
+    agent = SDNNQLearning(OBSERVATIONS, ONE_ACTION, approximator=sizes, seed=1)
+    train(agent, n_steps=1, seed=0)
+    is_over = threading.Event()
+
+    def read(values_of):
+        while not is_over.is_set():
+            for observation in OBSERVATIONS_TO_READ:
+                values_of(observation)
+
+    def learn():
+        train(agent, n_steps=30, seed=7)
+        return not is_over.is_set()
+
+    with ThreadPoolExecutor() as pool:
+        readers = [
+            pool.submit(read, agent.q_values),
+            pool.submit(read, partial(agent.act, explore=False)),
+        ]
+        learner = pool.submit(learn)
+        wait([learner], timeout=60)
+        is_over.set()
+    assert learner.result(), "the learner was done only after the readers"
+    assert [reader.result() for reader in readers] == [None, None]

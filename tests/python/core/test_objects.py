@@ -7,7 +7,7 @@ import subprocess
 import sys
 import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
 
 import numpy as np
@@ -132,6 +132,78 @@ def test_a_layer_refuses_training_while_threads_read_it(begin_in_thread):
     for reading in readings:
         np.testing.assert_array_equal(reading.result()[-len(expected) :], expected)
     trainer.present([0])
+
+
+N_UNITS = 1000
+BINS_OF_60_SAMPLES = np.tile(np.array(core_cells.BINS, np.int32), (20, 1))
+
+
+def new_online_layer():
+    """Return a layer with so many columns that it reads 60 samples for hundredths of a second."""
+    wide = [np.tile(core_cells.patterns(), 100)] * 2
+    code = core.SelectiveDesensitization(wide, wide, [[0, 1], [1, 0]])
+    return core.OnlineLayer(core.ParallelPerceptron(code, N_UNITS, seed=1))
+
+
+def learn_a_sample(layer):
+    """Learn the first of core_cells.BINS as a sample of class 0; each unit stands for a class."""
+    return layer.learn_labels(core_cells.BINS[:1], [0], N_UNITS, "one_vs_rest")
+
+
+def test_an_online_layer_learns_while_two_threads_read_without_pause():
+    layer = new_online_layer()
+    is_over = threading.Event()
+
+    def read():
+        while not is_over.is_set():
+            try:
+                layer.potentials(BINS_OF_60_SAMPLES)
+            except RuntimeError as error:  # called while the layer was being changed
+                if IN_USE not in str(error):
+                    raise
+
+    def learn():
+        for _ in range(30):
+            learn_a_sample(layer)
+        return not is_over.is_set()
+
+    with ThreadPoolExecutor() as pool:
+        readers = [pool.submit(read) for _ in range(2)]
+        learner = pool.submit(learn)
+        wait([learner], timeout=60)
+        is_over.set()
+    assert learner.result(), "the learner was done only after the readers"
+    assert [reader.result() for reader in readers] == [None, None]
+
+
+def test_a_signal_ends_a_wait_for_readers_and_its_handler_may_read(begin_in_thread):
+    layer = new_online_layer()
+    expected = layer.potentials(core_cells.BINS)
+    potentials = []
+
+    def read_and_raise(signal_number, frame):
+        potentials.append(layer.potentials(core_cells.BINS))
+        raise InterruptedError
+
+    def learn_until_the_signal():
+        timer.start()
+        learn_a_sample(layer)
+
+    previous = signal.signal(signal.SIGUSR1, read_and_raise)
+    timer = threading.Timer(0.1, signal.raise_signal, [signal.SIGUSR1])
+    try:
+        # It reads for seconds; signals do not interrupt it, as it is not in the main thread.
+        reading = begin_in_thread(lambda: layer.potentials(np.tile(BINS_OF_60_SAMPLES, (200, 1))))
+        with pytest.raises(InterruptedError):
+            learn_until_the_signal()
+        assert not reading.done()
+    finally:
+        timer.join()
+        signal.signal(signal.SIGUSR1, previous)
+    np.testing.assert_array_equal(potentials, [expected])
+    np.testing.assert_array_equal(layer.potentials(core_cells.BINS), expected)
+    reading.result()
+    learn_a_sample(layer)
 
 
 def test_a_batch_of_acrobots_refuses_other_threads_while_it_steps(begin_in_thread):
