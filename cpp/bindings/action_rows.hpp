@@ -1,4 +1,4 @@
-/// Actions of several environments in one array, in the type of their space.
+/// The actions of several environments in one array, in the number type of their action space.
 #pragma once
 
 #include <pybind11/numpy.h>
@@ -42,7 +42,7 @@ class ActionRows {
     std::copy_n(converted.data() + n_columns_ * i, n_columns_, numbers.begin());
   }
 
-  /// Sets row i to numbers that its type has.
+  /// Sets row i to `numbers`, which the array's type must be able to represent.
   void write(std::size_t i, std::span<const double> numbers) {
     core::require_below("environments", i, n_rows());
     const bool is_written = with_type([&](auto zero) {
@@ -57,7 +57,8 @@ class ActionRows {
  private:
   std::size_t n_rows() const { return static_cast<std::size_t>(array_.size()) / n_columns_; }
 
-  /// Calls `use` with a zero of the array's number type; false if that type is not handled here.
+  /// Calls `use` with a zero of the array's number type, so that it can access the memory as this
+  /// type. Returns false, without a call, if the memory cannot be accessed so.
   bool with_type(const auto& use) const {
     if (type_ == pybind11::dtype::num_of<double>()) return use(double()), true;
     if (type_ == pybind11::dtype::num_of<float>()) return use(float()), true;

@@ -1,4 +1,5 @@
-/// Agents of every kind, whose code is compiled in a single unit.
+/// Functions and a class for agents of every kind. They are declared without templates, so that the
+/// agents' code, which takes long to compile, is compiled in a single unit, agents.cpp.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -12,9 +13,11 @@
 
 namespace sdnn::bindings {
 
-/// Returns the networks or rules of an agent, as references that keep `owner`.
+/// Returns Python objects for the networks or rules of an agent, one for each dimension of actions
+/// or one for all. They refer to the agent's memory and keep its Python object `owner` alive.
 pybind11::list networks_of(agents::AnyAgent& agent, pybind11::handle owner);
-/// Returns the memory of the networks or rules of an agent.
+/// Returns the memory of the networks or rules of an agent, which lies outside the agent's object.
+/// It serves to find calls that use them; see WithoutGIL.
 std::span<std::byte> memory_of_parts(agents::AnyAgent& agent);
 
 }  // namespace sdnn::bindings
@@ -31,7 +34,7 @@ class BareAgent {
   BareAgent(const agents::AnyApproximatorConfig& approximator,
             const agents::AnyLearningConfig& learning, const std::vector<std::size_t>& n_actions,
             std::uint64_t seed);
-  /// With actions of one dimension, as many as the approximator has.
+  /// Makes an agent with actions of one dimension, as many as the approximator's configuration has.
   BareAgent(const agents::AnyApproximatorConfig& approximator,
             const agents::AnyLearningConfig& learning, std::uint64_t seed);
   BareAgent(BareAgent&&) noexcept;
@@ -48,8 +51,10 @@ class BareAgent {
   void warm_caches();
   /// Returns the action to take in a state, valid until the next act.
   Action act(std::span<const double> state, bool explore = true);
+  /// Returns an action of one dimension as a number in [-1, 1].
   double normalized_action(Action action) const;
-  /// Learns a transition of dt usual steps; of fuzzy rules that of the last exploring act.
+  /// Learns a transition whose duration is `dt` usual steps. With fuzzy rules `state` and `action`
+  /// must be those of the last exploring act.
   void learn(std::span<const double> state, Action action, double reward,
              std::span<const double> next_state, bool terminated, double dt = 1.0);
 

@@ -29,7 +29,8 @@ class ArrayArgument
 
   ArrayArgument() : Base(pybind11::handle(), typename Base::stolen_t()) {}
 
-  /// Takes an array of `T` as it is, or converts; false without an error if that is impossible.
+  /// Takes a C-contiguous array of `T` as it is, or with `convert` makes one from another object.
+  /// Returns false, without a Python error, if that is impossible.
   bool load(pybind11::handle source, bool convert) {
     const bool fits = Base::check_(source);
     if (!fits && !convert) return false;
@@ -49,7 +50,8 @@ std::span<const T> flat(const ArrayArgument<T>& array) {
   return {array.data(), static_cast<std::size_t>(array.size())};
 }
 
-/// A copy, for work without the GIL: meanwhile other threads may change the array.
+/// Returns a copy of an array's items, for work without the GIL, during which other threads may
+/// change the array.
 template <class T>
 std::vector<T> copied(std::span<const T> items) {
   return {items.begin(), items.end()};
@@ -65,7 +67,8 @@ std::span<const T> vector(const ArrayArgument<T>& array, const char* name) {
   return flat(array);
 }
 
-/// The items of a two-dimensional array. Throws std::invalid_argument naming the argument.
+/// The items of a two-dimensional array, row by row. Throws std::invalid_argument naming the
+/// argument if it has another number of dimensions, or of columns unless n_columns is 0.
 template <class T>
 std::span<const T> matrix(const ArrayArgument<T>& array, const char* name,
                           std::size_t n_columns = 0) {
@@ -75,13 +78,13 @@ std::span<const T> matrix(const ArrayArgument<T>& array, const char* name,
   return bindings::flat(array);
 }
 
-/// An array with a copy of numbers. Shape: (n,).
+/// Returns a NumPy array with a copy of the numbers. Shape: (n,).
 template <class T>
 pybind11::array_t<T> array_of(std::span<const T> numbers) {
   return pybind11::array_t<T>(static_cast<pybind11::ssize_t>(numbers.size()), numbers.data());
 }
 
-/// An array whose numbers `fill` writes, row by row.
+/// Returns a new array of a shape, whose numbers fill(span) writes, row by row.
 template <class T, class Fill>
 pybind11::array_t<T> filled(const std::vector<std::size_t>& shape, const Fill& fill) {
   pybind11::array_t<T> array(shape);
@@ -89,13 +92,14 @@ pybind11::array_t<T> filled(const std::vector<std::size_t>& shape, const Fill& f
   return array;
 }
 
-/// Throws std::length_error unless patterns fit in an array of 1 GiB. Call it before making them.
+/// Throws std::length_error unless `n_bins` patterns of `n_units` signs fit into an array of 1 GiB.
+/// Call it before the patterns are made. The numbers are doubles because they are not checked yet.
 inline void require_room_for_signs(double n_bins, double n_units) {
   core::require_bytes("n_units or n_bins", "the patterns, a byte for each unit,", n_bins * n_units,
                       core::kDefaultMaxTableBytes);
 }
 
-/// The patterns of a table, +1 and -1. Shapes: (n_bins, n_units).
+/// Returns the patterns of a table as signs, +1 and -1. Shape: (n_bins, n_units).
 inline pybind11::array_t<std::int8_t> signs_of(const coding::PatternTable& table) {
   return filled<std::int8_t>({table.n_bins(), table.n_units()}, [&](auto signs) {
     auto sign = signs.begin();
@@ -108,14 +112,14 @@ inline pybind11::array_t<std::int8_t> signs_of(const coding::PatternTable& table
   });
 }
 
-/// The table of patterns +1 and -1. Shapes: (n_bins, n_units).
+/// Makes a table of patterns from signs, +1 and -1. Shape: (n_bins, n_units).
 inline coding::PatternTable table_of(const ArrayArgument<std::int8_t>& signs) {
   const auto values = matrix(signs, "patterns");
   return coding::PatternTable::from_signs(values, static_cast<std::size_t>(signs.shape(0)),
                                           static_cast<std::size_t>(signs.shape(1)));
 }
 
-/// The tables of all inputs, of one pattern size. Shapes: (n_bins, n_units) each.
+/// Makes a table of patterns for each input. Shapes: (n_bins, n_units) each.
 inline std::vector<coding::PatternTable> tables_of(
     const std::vector<ArrayArgument<std::int8_t>>& signs) {
   std::vector<coding::PatternTable> tables;
@@ -123,7 +127,8 @@ inline std::vector<coding::PatternTable> tables_of(
   return tables;
 }
 
-/// Pairs (modified, modifier) of inputs. Shapes: (n_pairs, 2).
+/// Reads pairs (modified, modifier) of inputs. Shape: (n_pairs, 2). Throws std::invalid_argument
+/// for negative numbers.
 inline std::vector<coding::InputPair> pairs_of(const ArrayArgument<std::int32_t>& pairs) {
   const auto inputs = matrix(pairs, "pairs", 2);
   std::vector<coding::InputPair> input_pairs;

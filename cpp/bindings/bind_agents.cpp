@@ -28,7 +28,8 @@ using approximators::SDNNCConfig;
 
 namespace {
 
-/// Titles, settings of the approximator, of learning and of observations.
+/// Returns presets as a dictionary: name to (title, settings of the approximator, of learning, of
+/// observations).
 template <class Approximator, class Learning, std::size_t N>
 auto by_name(
     const std::array<agents::Named<agents::Settings<Approximator, Learning>>, N>& presets) {

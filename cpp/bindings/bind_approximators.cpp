@@ -29,7 +29,7 @@ using bindings::ArrayArgument;
 
 namespace {
 
-/// Binds the read access to the code of a network's states.
+/// Binds members that describe the code of a network's states.
 template <class Network>
 void bind_code(py::class_<Network>& network) {
   network
@@ -57,7 +57,7 @@ void bind_code(py::class_<Network>& network) {
           py::arg("mu"), py::arg("nu"), "sigma_mu_nu: (m,)");
 }
 
-/// number(i, j) of all units and inputs: (n, D).
+/// Makes an array of number(unit, input), for all hidden units and units of x_SD. Shape: (n, D).
 template <class Number>
 py::array_t<std::int32_t> weight_matrix(const SDNNC& network, const Number& number) {
   const std::size_t n_units = network.hidden_layer().n_units();
@@ -67,7 +67,7 @@ py::array_t<std::int32_t> weight_matrix(const SDNNC& network, const Number& numb
   });
 }
 
-/// number(i) of i = 0 .. n - 1: (n,).
+/// Makes an array of number(i), i = 0 .. n - 1. Shape: (n,).
 template <class T, class Number>
 py::array_t<T> numbers(std::size_t n, const Number& number) {
   return bindings::filled<T>({n}, [&](auto out) {

@@ -37,13 +37,15 @@ std::shared_ptr<Code> make_code(const std::vector<ArrayArgument<std::int8_t>>& m
                                 bindings::pairs_of(pairs));
 }
 
+/// Computes the codes of all rows of bins. Shape: (n_rows, n_columns), entries +1, 0 and -1.
 py::array_t<std::int8_t> transform(const Code& code, const Bins& bins) {
   const auto values = matrix(bins, "bins", code.n_inputs());
   return bindings::filled<std::int8_t>({static_cast<std::size_t>(bins.shape(0)), code.n_columns()},
                                        [&](auto out) { coding::write_signs(code, values, out); });
 }
 
-/// The inner products of the codes of all rows of bins, with those of other bins if there are any.
+/// Computes the inner products of the codes of all rows of `bins` and those of all rows of
+/// `other_bins`, by default of `bins`. Shape: (n_rows, n_other_rows).
 py::array_t<std::int32_t> gram(const Code& code, const Bins& bins,
                                const std::optional<Bins>& other_bins) {
   const auto values = copied(matrix(bins, "bins", code.n_inputs()));

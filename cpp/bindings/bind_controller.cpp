@@ -37,7 +37,8 @@ using bindings::ArrayArgument;
 
 namespace {
 
-/// Where an input of a state comes from: its kind, and the numbers that belong to it.
+/// Describes where an input of a state comes from: its kind, and the numbers that belong to it, the
+/// variable and, for an angle of two variables, the other one, or a symbol's number.
 std::pair<std::string, std::vector<std::size_t>> described(const agents::ObservedInput& input) {
   switch (input.kind) {
     case agents::ObservedKind::variable:
@@ -84,10 +85,11 @@ std::span<const double> best_action(Controller& controller, std::span<const doub
   const auto state = bindings::copied(controller.prepare(observation, environment));
   auto& workspace = bindings::workspace_of(read);
   read_without_gil(controller, [&] { read.read(state, workspace); });
-  return controller.best_of(workspace, environment, mask);  // which draws, and so needs the lock
+  return controller.best_of(workspace, environment, mask);  // draws random numbers: with the GIL
 }
 
-/// The values of all actions of a dimension. Other threads run meanwhile, as in best_action.
+/// Returns the values of all actions of a dimension; other threads may read meanwhile, as in
+/// best_action.
 py::array_t<double> values(Controller& controller, const ArrayArgument<double>& observation,
                            std::size_t dimension) {
   wait_for_changes(controller);
@@ -100,12 +102,12 @@ py::array_t<double> values(Controller& controller, const ArrayArgument<double>& 
   if (controller.history().is_none()) {
     read_without_gil(controller, read);
   } else {
-    read();  // what other threads may change meanwhile: the memory of episodes
+    read();  // with the GIL, as other threads may change the memory of episodes
   }
   return array_of(row);
 }
 
-/// Which actions are allowed; None: all.
+/// The allowed actions, 1 or 0 for each; None allows all.
 using MaskArgument = std::optional<ArrayArgument<std::uint8_t>>;
 
 agents::ActionMask mask_of(const MaskArgument& mask) {
@@ -125,16 +127,17 @@ agents::ActionMask mask_of(const MaskArgument& masks, const char* name, std::siz
 std::span<const double> row(const ArrayArgument<double>& rows, const char* name,
                             std::size_t n_columns, std::size_t i) {
   const auto numbers = bindings::flat(rows);
-  if (i >= numbers.size() / n_columns) {  // only the text for a bad row costs memory
+  if (i >= numbers.size() / n_columns) {  // tested first: making the message allocates
     core::require(false, name, std::to_string(n_columns) + " numbers for each environment",
                   numbers.size());
   }
   return numbers.subspan(n_columns * i, n_columns);
 }
 
-/// Learns the steps of the environments in order: at most `most`, and none after the first that
-/// ends an episode. After every other step, progress becomes (steps so far) / `goal`, if given,
-/// counting from `n_steps`. Returns how many were learned: all before the first that cannot be.
+/// Learns the steps of the listed environments in order: at most `most`, and none after the first
+/// that ends an episode. After every step but such a last one, progress becomes (`n_steps` + number
+/// of learned steps) / `goal`, if there is a goal. Returns the number of learned steps. If a step
+/// cannot be learned, its error is thrown if it is the first; otherwise learning stops before it.
 std::size_t learn_each(Controller& controller, const ArrayArgument<double>& observations,
                        const py::object& actions, const py::list& rewards,
                        const ArrayArgument<double>& next_observations, const py::list& terminated,
@@ -176,7 +179,8 @@ std::size_t learn_each(Controller& controller, const ArrayArgument<double>& obse
   return n_learned;
 }
 
-/// Whether an object is an array of numbers with `n_before` dimensions before `shape`.
+/// Whether an object is an array of numbers whose shape is `n_before` dimensions followed by
+/// `shape`.
 bool is_array_of(py::handle object, py::ssize_t n_before, const std::vector<py::ssize_t>& shape) {
   if (!Py_IS_TYPE(object.ptr(), py::detail::npy_api::get().PyArray_Type_)) return false;
   const auto array = py::reinterpret_borrow<py::array>(object);
@@ -185,7 +189,8 @@ bool is_array_of(py::handle object, py::ssize_t n_before, const std::vector<py::
          std::string_view("fiub").find(array.dtype().kind()) != std::string_view::npos;
 }
 
-/// Copies the numbers of an array to `to`, and returns their end.
+/// Copies the numbers of an array to `to`, and returns the end of the copies. Arrays of float32, as
+/// most environments have, need no intermediate array.
 double* copy_numbers(py::handle object, double* to) {
   const auto array = py::reinterpret_borrow<py::array>(object);
   const py::dtype type = array.dtype();
@@ -198,7 +203,7 @@ double* copy_numbers(py::handle object, double* to) {
 }
 
 /// Copies observations of several environments, of `shape` each, in an array or a list of arrays,
-/// to rows of float64; None where they are no such arrays of numbers.
+/// to an array of float64 with a row for each environment. Returns None for anything else.
 std::optional<py::array_t<double>> observation_rows(const py::object& observations,
                                                     const std::vector<py::ssize_t>& shape) {
   const auto n_variables =

@@ -22,8 +22,9 @@ namespace {
 /// The thread in which Python handles signals.
 unsigned long main_thread = 0;
 
-/// Runs Python's pending signal handlers, which Python itself does between its instructions, and
-/// throws if one raises, such as KeyboardInterrupt for Ctrl-C.
+/// Checks for signals in long computations, as Python itself does only between its instructions:
+/// runs the handlers of signals that have arrived, and throws what a handler raises, such as
+/// KeyboardInterrupt for Ctrl-C. Without `at_once` it does so at most every 50 ms, which is chosen.
 void check_signals(bool at_once) {
   using Clock = std::chrono::steady_clock;
   constexpr std::chrono::milliseconds kInterval{50};

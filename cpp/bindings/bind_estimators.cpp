@@ -33,7 +33,8 @@ using estimators::ParallelPerceptron;
 
 std::size_t n_rows(const Bins& bins) { return static_cast<std::size_t>(bins.shape(0)); }
 
-/// Makes a layer with the weights and thresholds, or without them with random ones.
+/// Makes a layer with these weights and thresholds, or with random ones from `seed` if there are
+/// none.
 std::shared_ptr<ParallelPerceptron> make_layer(
     const std::shared_ptr<coding::SelectiveDesensitization>& code, std::size_t n_units,
     std::uint64_t seed, const std::optional<ArrayArgument<std::int32_t>>& weights,
@@ -55,7 +56,7 @@ py::array_t<std::int32_t> thresholds_of(const ParallelPerceptron& layer) {
   return bindings::array_of(layer.thresholds());
 }
 
-/// The potentials of all units for each row of bins, computed without Python's lock.
+/// Computes the potentials of all units for each row of bins. Shape: (n_rows, n_units).
 Matrix potentials_of(const ParallelPerceptron& layer, const Bins& bins, int n_threads) {
   const auto values = copied(matrix(bins, "bins", layer.code().n_inputs()));
   return bindings::filled<std::int32_t>({n_rows(bins), layer.n_units()}, [&](auto out) {
@@ -64,7 +65,7 @@ Matrix potentials_of(const ParallelPerceptron& layer, const Bins& bins, int n_th
   });
 }
 
-/// The number of firing units in each group for each row of bins, computed without Python's lock.
+/// Counts the firing units in each group for each row of bins. Shape: (n_rows, n_groups).
 Matrix counts_of(const ParallelPerceptron& layer, const Bins& bins, std::size_t n_groups,
                  int n_threads) {
   const auto values = copied(matrix(bins, "bins", layer.code().n_inputs()));
@@ -75,7 +76,8 @@ Matrix counts_of(const ParallelPerceptron& layer, const Bins& bins, std::size_t 
   });
 }
 
-/// The counts of several layers of one code, which is computed once for all.
+/// Counts the firing units in several layers of one code, whose codes of samples are computed once
+/// for all. Shape: (n_layers, n_rows, n_groups).
 py::array_t<std::int32_t> counts_of_all(
     const std::vector<std::shared_ptr<ParallelPerceptron>>& layers, const Bins& bins,
     std::size_t n_groups, int n_threads) {
@@ -93,7 +95,8 @@ py::array_t<std::int32_t> counts_of_all(
   });
 }
 
-/// LIBSDNN's tables of patterns as arrays of signs, after a check of their memory.
+/// Makes LIBSDNN's tables of patterns: two lists of arrays of signs, of modified inputs and
+/// modifiers. Throws std::length_error before they are made if they are too large.
 py::tuple libsdnn_tables(int n_units, const std::vector<std::pair<int, int>>& inputs,
                          const ArrayArgument<std::int32_t>& pairs,
                          const std::vector<std::uint32_t>& seed, const std::string& library) {
@@ -125,7 +128,7 @@ py::tuple libsdnn_weights(std::size_t n_units, std::size_t n_columns, int low, i
   return py::make_tuple(weights, bindings::array_of<std::int32_t>(drawn.thresholds));
 }
 
-/// The names of all of `values`.
+/// Returns the names of all of `values`.
 template <class Values>
 py::tuple names_of(const Values& values) {
   py::list names;
@@ -146,7 +149,8 @@ estimators::PerceptronRule perceptron_rule(const ParallelPerceptron& layer,
           estimators::class_scheme_named(scheme)};
 }
 
-/// The potentials of an online layer's units for each row of bins.
+/// Computes the potentials of an online layer's units for each row of bins. Shape: (n_rows,
+/// n_units).
 Matrix online_potentials_of(const estimators::OnlineLayer& layer, const Bins& bins) {
   const auto values = copied(matrix(bins, "bins", layer.layer().code().n_inputs()));
   return bindings::filled<std::int32_t>({n_rows(bins), layer.layer().n_units()}, [&](auto out) {
@@ -197,14 +201,15 @@ void bind_online_layer(py::module_& module) {
           "synchronize",
           [](OnlineLayer& self) {
             bindings::wait_for_changes(self);
-            // Readers of its own weights may continue meanwhile.
+            // It changes the layer, and only reads the weights of `self`, as `potentials` does.
             const bindings::WithoutGIL unlocked(std::as_const(self), self.layer());
             self.synchronize();
           },
           "Brings the layer up to date");
 }
 
-/// Binds a trainer whose rule is `rule_of(layer, arguments...)`, of arguments that `names` names.
+/// Binds a trainer. Its constructor takes a layer, bins, the arguments from which `rule_of` makes
+/// the rule, called `names` in Python, and settings of training.
 template <class Trainer, class Rule, class... Arguments, class... Names>
 void bind_trainer(py::module_& module, const char* name, const char* doc,
                   Rule (*rule_of)(const ParallelPerceptron&, Arguments...), const Names&... names) {

@@ -24,7 +24,8 @@ namespace {
 
 using Numbers = ArrayArgument<double>;
 
-/// Binds all but the constructor of a regression, whose numbers of inputs and outputs may grow.
+/// Binds the members, without constructors, of a regression whose numbers of inputs and outputs may
+/// grow.
 template <class Model>
 py::class_<Model> bind_regression(py::module_& module, const char* name, const char* doc) {
   auto model = bindings::Class<Model>(module, name, doc);

@@ -47,7 +47,8 @@ constexpr bool sdnn::bindings::kIsComposed<PlainRBFAgent> = false;
 
 namespace {
 
-/// The times that `measure` of an object returns, int64 nanoseconds (n,); it runs without the GIL.
+/// Calls `measure`, which times calls of an object, without the GIL. Returns nanoseconds, shape
+/// (n,).
 template <class Object, class Measure>
 py::array_t<std::int64_t> times_of(Object& object, const Measure& measure) {
   tools::Times times;
@@ -58,6 +59,7 @@ py::array_t<std::int64_t> times_of(Object& object, const Measure& measure) {
   return bindings::array_of<std::int64_t>(times);
 }
 
+/// Binds tools::time_agent_steps for a class of agents.
 template <class Agent>
 void def_time_agent_steps(py::module_& module) {
   module.def(
@@ -69,6 +71,7 @@ void def_time_agent_steps(py::module_& module) {
       "The agent learns and acts at random states; nanoseconds per step: (n_repetitions,)");
 }
 
+/// Makes an array of read(row), for all rows of a trial.
 template <class Value, class Read>
 py::array_t<Value> column(const Trial& trial, Read read) {
   return bindings::filled<Value>({trial.rows().size()}, [&](auto out) {
@@ -76,7 +79,7 @@ py::array_t<Value> column(const Trial& trial, Read read) {
   });
 }
 
-/// The rows of a trial's test episodes, as a dictionary of columns.
+/// Returns the rows of a trial's test episodes, as a dictionary of columns.
 py::typing::Dict<py::str, py::array> test_rows(const Trial& trial) {
   using tools::TestRow;
   py::typing::Dict<py::str, py::array> rows;
@@ -88,7 +91,8 @@ py::typing::Dict<py::str, py::array> test_rows(const Trial& trial) {
   return rows;
 }
 
-/// How often an SDNN-C computed potentials in full or from a neighbour, and the columns it added.
+/// Returns how often the SDNN-C of a trial has computed potentials in full and from a neighbour,
+/// and how many columns it has added; see ActivationCache::Counts.
 py::typing::Dict<py::str, py::int_> cache_counts(const Trial& trial) {
   const auto* const agent = std::get_if<QLearning<SDNNC>>(&trial.agent().agent());
   if (agent == nullptr) throw std::invalid_argument("trial must be one of SDNN-C");
@@ -208,7 +212,7 @@ void bind_trials(py::module_& module) {
   def_time_agent_steps<PlainRBFAgent>(module);
 }
 
-/// Binds a member function that returns times.
+/// Binds a member function that times `n_repetitions` of something.
 template <class Object, class... Arguments, class... Extra>
 void def_times(py::class_<Object>& type, const char* name,
                tools::Times (Object::*measure)(Arguments...), const Extra&... extra) {

@@ -28,7 +28,8 @@ void set_error(PyObject* kind, const auto& error) {
   PyErr_SetObject(kind, raised.ptr());
 }
 
-/// Errors about an argument have its name as an attribute, `argument`.
+/// Translates errors about an argument into Python's, with the argument's name as the attribute
+/// `argument`.
 void translate(std::exception_ptr error) {
   if (!error) return;
   try {
@@ -44,7 +45,7 @@ void translate(std::exception_ptr error) {
 
 }  // namespace
 
-// Without mod_gil_not_used: objects.hpp relies on the GIL.
+// The module does not declare mod_gil_not_used, because objects.hpp relies on the GIL.
 PYBIND11_MODULE(_core, module) {
   module.doc() = "The compiled core of sdnn; use it through the packages above it.";
   module.attr("__version__") = SDNN_VERSION;

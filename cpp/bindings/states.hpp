@@ -16,7 +16,7 @@
 
 namespace sdnn::bindings {
 
-/// Copies.
+/// Copies a state to a dictionary of arrays.
 inline pybind11::dict arrays_of(const core::State& state) {
   pybind11::dict arrays;
   for (const auto& [name, tensor] : state) {
@@ -29,13 +29,14 @@ inline pybind11::dict arrays_of(const core::State& state) {
   return arrays;
 }
 
-/// Copies. Throws std::invalid_argument naming an array of a type that no tensor has.
+/// Copies a dictionary of arrays to a state. Throws std::invalid_argument naming an array of a type
+/// that no tensor has.
 inline core::State state_from(const pybind11::dict& arrays) {
   core::State state;
   for (const auto& [key, value] : arrays) {
     const auto name = escaped_text_of(key);
     const auto array =
-        pybind11::array::ensure(value, pybind11::array::c_style);  // nothing is converted
+        pybind11::array::ensure(value, pybind11::array::c_style);  // its type is not converted
     core::Tensor tensor;
     const auto found = std::ranges::find_if(core::kTensorTypes, [&array](const auto& known) {
       return array && array.dtype().equal(pybind11::dtype(known.dtype));

@@ -1,4 +1,5 @@
-/// Enumerations with words are texts in Python: "uniform".
+/// Texts of Python, as which C++ enumerations with words appear: InitialWeights::uniform is
+/// "uniform".
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -13,7 +14,8 @@
 
 namespace sdnn::bindings {
 
-/// A Python text, empty where UTF-8 has none: arguments of a command may have any bytes.
+/// Returns a Python text in UTF-8, or an empty text if it cannot be encoded: a command's arguments
+/// may contain any bytes, which Python keeps as unpaired surrogates.
 inline std::string_view text_of(pybind11::handle text) {
   Py_ssize_t size = 0;
   const char* const data = PyUnicode_AsUTF8AndSize(text.ptr(), &size);
@@ -22,7 +24,7 @@ inline std::string_view text_of(pybind11::handle text) {
   return {};
 }
 
-/// A Python text with escapes in place of what UTF-8 does not have.
+/// Returns a Python text in UTF-8, with escapes for characters that cannot be encoded.
 inline std::string escaped_text_of(pybind11::handle text) {
   return pybind11::str(text).attr("encode")("utf-8", "backslashreplace").cast<std::string>();
 }

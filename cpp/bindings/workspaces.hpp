@@ -1,4 +1,4 @@
-/// Workspaces for those who read a network from Python.
+/// Workspaces for calls from Python that read a network.
 #pragma once
 
 #include <algorithm>
@@ -8,8 +8,8 @@
 
 namespace sdnn::bindings {
 
-/// Returns the calling thread's workspace for a network. The workspaces of the latest few networks
-/// are kept, so that values of a repeated state are cheap.
+/// Returns the calling thread's workspace for a network. A thread keeps the workspaces of the eight
+/// networks (a chosen number) that it used last, so that values of a repeated state are cheap.
 template <class Network>
 typename Network::Workspace& workspace_of(const Network& network) {
   constexpr std::size_t kKept = 8;
@@ -17,7 +17,7 @@ typename Network::Workspace& workspace_of(const Network& network) {
     std::uint64_t network;
     typename Network::Workspace workspace;
   };
-  thread_local std::list<Kept> kept;  // the latest first
+  thread_local std::list<Kept> kept;  // the last used network comes first
   const auto found =
       std::ranges::find(kept, network.identity(), [](const Kept& entry) { return entry.network; });
   if (found != kept.end()) {

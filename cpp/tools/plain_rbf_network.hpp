@@ -17,11 +17,11 @@
 namespace sdnn::tools {
 
 /// An RBF network whose `values` are computed by the definition, from every joint basis of every
-/// action: a reference for tests of RBFNetwork, to which they are equal within 1e-12 of the largest
-/// |weight|. It learns what RBFNetwork learns, up to rounding.
+/// action. It is a reference for tests and timings of RBFNetwork, whose values differ by at most
+/// 1e-12 of the largest |weight|.
 ///
-/// `value` and `update`, for a single action, are those of RBFNetwork and much cheaper. Errors are
-/// those of RBFNetwork. Cost of `values` at d = 6: 601 x 16,384 exponentials.
+/// `value` and `update`, for a single action, call RBFNetwork and are much cheaper. The functions
+/// throw what those of RBFNetwork throw. Cost of `values` at d = 6: 601 x 16,384 exponentials.
 class PlainRBFNetwork {
  public:
   explicit PlainRBFNetwork(approximators::RBFNetwork network) : network_(std::move(network)) {}
@@ -60,8 +60,8 @@ class PlainRBFNetwork {
   }
 
  private:
-  // Writes the logarithms of one dimension's Gaussians at x, -((x - centre) / width)^2 / 2, with
-  // lengths in units of the centres' spacing.
+  // Writes the exponents of one dimension's Gaussians at x, -((x - centre) / width)^2 / 2; lengths
+  // are in units of the distance between centres.
   void set_exponents(double x, std::vector<double>& exponents) const noexcept {
     const double n_gaps = static_cast<double>(exponents.size() - 1);
     for (std::size_t k = 0; k < exponents.size(); ++k) {
@@ -78,7 +78,8 @@ class PlainRBFNetwork {
     for (const double x : state) {
       set_exponents(x, exponents);
       const std::size_t n = exponents.size();
-      // From the back, so that one array is enough: entry i becomes entries i n .. i n + n - 1.
+      // Entry i becomes the n entries from i n on. Backwards, no entry is overwritten before it is
+      // read, so that one array is enough.
       for (std::size_t i = size; i-- > 0;) {
         const double before = sums[i];
         for (std::size_t k = 0; k < n; ++k) sums[i * n + k] = before + exponents[k];
@@ -87,9 +88,9 @@ class PlainRBFNetwork {
     }
   }
 
-  // Returns sum W G / sum G over all joint bases, with exponents state_exponents[j] + exponents[b].
-  // It computes a few exponentials at a time, so that the compiler can use vectors; the order of
-  // the sums does not change.
+  // Returns the mean of the weights of all joint bases, weighted by their Gaussians, whose
+  // exponents are state_exponents[j] + exponents[b]. Some exponentials are computed at a time, so
+  // that the compiler can use vectors; sums are in the order of the bases.
   double weighted_mean(const Workspace& workspace) const noexcept {
     const auto& [network, state_exponents, exponents] = workspace;
     const std::span<const double> weights = network_.weights();

@@ -18,14 +18,14 @@ using Times = std::vector<std::int64_t>;
 /// The largest number of repetitions in a measurement.
 inline constexpr int kMaxRepetitions = 1 << 24;
 
-/// Nanoseconds since some fixed point in the past.
+/// Returns nanoseconds since some fixed point in the past.
 inline std::int64_t now() noexcept {
   using std::chrono::duration_cast, std::chrono::nanoseconds, std::chrono::steady_clock;
   return duration_cast<nanoseconds>(steady_clock::now().time_since_epoch()).count();
 }
 
-/// Nanoseconds that the processor has spent on the calling thread, or those of now() on systems
-/// that do not count them. Reading them costs a call of the system.
+/// Returns the nanoseconds for which the calling thread has run on a processor, or those of now()
+/// on systems that do not count them. It needs a system call.
 inline std::int64_t thread_time() noexcept {
 #ifdef CLOCK_THREAD_CPUTIME_ID
   std::timespec time{};
@@ -46,15 +46,16 @@ void keep(const Value& value) noexcept {
 #endif
 }
 
-/// A call that takes longer than this, in nanoseconds, is likely to be interrupted by others.
+/// The duration in nanoseconds from which on a call has probably been interrupted by other
+/// programs.
 inline constexpr std::int64_t kLongCall = 100'000;
 
 /// Measures the time of every call of timed(i), i = 0 .. n_repetitions - 1, each after an untimed
 /// call of prepare(i).
 ///
-/// Reading the clock costs some 30 ns, which are included. With `is_alone`, a call that takes
-/// longer than kLongCall counts only while its thread is running: other programs have no effect
-/// then. Throws std::invalid_argument unless n_repetitions is in [0, kMaxRepetitions].
+/// Times include some 30 ns for reading the clock. With `is_alone`, the time of a call longer than
+/// kLongCall is that for which its thread was running, so that other programs have no effect.
+/// Throws std::invalid_argument unless n_repetitions is in [0, kMaxRepetitions].
 template <class Prepare, class Timed>
 Times time_each(int n_repetitions, Prepare&& prepare, Timed&& timed, bool is_alone = false) {
   core::require_in_range("n_repetitions", n_repetitions, 0, kMaxRepetitions);

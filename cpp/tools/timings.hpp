@@ -1,5 +1,5 @@
-/// Timings of the network's parts of a decision, of the acrobot, of whole decisions in a trial, and
-/// of the steps of any agent.
+/// Timings of the computations of a decision: those of the network, those of the acrobot, whole
+/// decisions in a trial, and steps of any agent.
 #pragma once
 
 #include <algorithm>
@@ -23,13 +23,13 @@
 
 namespace sdnn::tools {
 
-/// Times a network at random states, which its caches do not contain.
+/// Timings of a network at random states, which its caches do not contain.
 ///
 /// The network should have learned before: untrained weights are smaller, and small weights are
 /// added faster.
 class NetworkParts {
  public:
-  /// A copy of `network` is timed, and learns. The states follow from `seed`.
+  /// Takes the network to time, which will learn; states are drawn from `seed`.
   NetworkParts(approximators::SDNNC network, std::uint64_t seed)
       : network_(std::move(network)),
         random_(seed, core::Stream::exploration),
@@ -41,7 +41,7 @@ class NetworkParts {
   const approximators::SDNNC& network() const noexcept { return network_; }
   const approximators::SDNNC::Workspace& workspace() const noexcept { return workspace_; }
 
-  /// Q(s, a) of all actions at a new state.
+  /// Times Q(s, a) of all actions at a new state.
   Times time_values(int n_repetitions) {
     return time_each(
         n_repetitions, [this](int) { draw_state(); },
@@ -55,9 +55,9 @@ class NetworkParts {
         [this](int) { network_.values(state_, workspace_, values_); });
   }
 
-  /// Times a learning step at a state that was just evaluated, as in an agent. Q moves alternately
-  /// up and down by `n_corrected` units of its window, if so many units can change. Throws
-  /// std::invalid_argument unless n_corrected is in [1, n'].
+  /// Times a correction at a state that was just evaluated, as in an agent. The number of firing
+  /// units in the window of a random action is moved up and down in turn by `n_corrected`, if so
+  /// many units can change. Throws std::invalid_argument unless n_corrected is in [1, n'].
   Times time_corrections(int n_repetitions, int n_corrected) {
     require_units("n_corrected", n_corrected);
     const auto& scale = network_.output_scale();
@@ -116,6 +116,7 @@ class NetworkParts {
     for (double& value : state_) value = random_.uniform();
   }
 
+  /// Draws a state and evaluates it, so that the workspace has it.
   void recall_new_state() {
     draw_state();
     network_.values(state_, workspace_, values_);
@@ -140,7 +141,7 @@ Times time_decisions(AcrobotTrial<Agent>& trial, int n_episodes) {
   trial.advance(n_episodes, [&] {
     const std::int64_t after = now();
     times.push_back(after - before);
-    before = now();  // without the vector's growth
+    before = now();  // again, so that the time of push_back does not count
   });
   return times;
 }
@@ -149,7 +150,8 @@ Times time_decisions(AcrobotTrial<Agent>& trial, int n_episodes) {
 /// integration steps.
 class AcrobotDecisions {
  public:
-  /// The goal and the number of decisions of `config` are not used.
+  /// Takes the acrobot's configuration, except for its goal height and max_decisions, which are
+  /// replaced.
   AcrobotDecisions(environments::AcrobotConfig config, std::uint64_t seed)
       : acrobot_(endless(config)), random_(seed, core::Stream::exploration) {}
 
@@ -190,9 +192,9 @@ class AcrobotDecisions {
 /// acting in it with exploration.
 ///
 /// States are uniform in [0, 1)^d and rewards in [-1, 1), both drawn from `seed`, in a single
-/// episode that does not terminate. Drawing and the first act are not timed, nor other programs'
-/// share of the processor. Give each call another seed, so that no state is in the agent's caches.
-/// Make an untimed call first, because an untrained agent can be faster. Throws
+/// episode that does not terminate. Drawing them, the first act and other programs are not timed.
+/// Give each call another seed, so that no state is in the agent's caches. Discard the times of a
+/// first call, because an untrained agent can be faster. Throws
 /// std::invalid_argument unless n_repetitions is in [0, kMaxRepetitions], and the agent's errors.
 template <agents::Agent Agent>
 Times time_agent_steps(Agent& agent, int n_repetitions, std::uint64_t seed) {

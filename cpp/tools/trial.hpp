@@ -49,7 +49,7 @@ struct ProtocolConfig {
   bool operator==(const ProtocolConfig&) const = default;
 };
 
-/// The outcome of one test episode.
+/// The outcome of a test episode.
 struct TestRow {
   std::int32_t episode;   ///< learning episodes so far
   std::int32_t steps;     ///< decisions used; all of them if not solved
@@ -57,16 +57,18 @@ struct TestRow {
   bool solved;            ///< the goal was reached
 };
 
-/// A learning agent on the acrobot swing-up; the same configs and seed give the same rows.
+/// A learning agent on the acrobot swing-up; equal configurations and seeds give equal rows.
 ///
-/// The agent's normalized action is the share of the largest torque. The sensors' noise has
-/// separate random streams, so that with the same seed every agent gets the same noise in each
-/// observation. A test episode is greedy, learns nothing, uses the current lambda, and draws from
-/// separate random streams. Source: method.md, section 5.2.
+/// The torque is the agent's normalized action, in [-1, 1], times the largest torque. Sensor noise
+/// has random streams that nothing else draws from, so that with the same seed every agent gets the
+/// same noise in each observation. In a test episode the agent is greedy and learns nothing; the
+/// goal tolerance lambda is that of the last learning episode, and noise has another stream.
+/// Source: method.md, section 5.2.
 template <agents::Agent Agent>
 class AcrobotTrial {
  public:
-  /// Throws std::invalid_argument if a config is impossible or agent and sensors do not fit.
+  /// Takes the agent and makes its task. Throws std::invalid_argument if a configuration is
+  /// impossible, or if the agent does not have as many inputs as there are sensors.
   AcrobotTrial(Agent agent, const environments::AcrobotConfig& acrobot,
                const environments::GoalScheduleConfig& goal,
                const environments::SensorConfig& sensors, const ProtocolConfig& protocol,
@@ -85,7 +87,8 @@ class AcrobotTrial {
     core::require(agent_.n_inputs() == observed_.size(), "n_inputs",
                   "the number of inputs of the sensors, " + std::to_string(observed_.size()),
                   agent_.n_inputs());
-    // Touch the memory of the agent and the rows, so that no decision waits for new pages.
+    // The memory of the agent and of the rows is written to, so that the operating system provides
+    // its pages now and not during a decision.
     if constexpr (requires { agent_.warm_caches(); }) agent_.warm_caches();
     core::require_bytes(
         "episodes / evaluate_every_episodes", "the rows of the test episodes",
@@ -95,6 +98,7 @@ class AcrobotTrial {
     rows_.clear();
   }
 
+  /// The number of learning episodes that have begun.
   int episode() const noexcept { return episode_; }
   bool finished() const noexcept {
     return episode_ == protocol_.episodes && !in_episode_ && !is_test_;
@@ -103,8 +107,8 @@ class AcrobotTrial {
   std::int64_t n_decisions() const noexcept { return n_decisions_; }
   std::span<const TestRow> rows() const noexcept { return rows_; }
   const Agent& agent() const noexcept { return agent_; }
-  /// The agent, for inspection during the trial. Evaluating it does not change the trial; acting
-  /// and learning do.
+  /// The agent, for inspection during the trial. Reading its values does not change the trial;
+  /// acting and learning would.
   Agent& agent() noexcept { return agent_; }
   /// The acrobot as the last decision left it.
   const environments::Acrobot& acrobot() const noexcept { return acrobot_; }
@@ -171,12 +175,14 @@ class AcrobotTrial {
  private:
   using Action = decltype(std::declval<Agent&>().act(std::span<const double>(), true));
 
+  /// Returns the configuration of the sensors in test episodes.
   static environments::SensorConfig of_tests(environments::SensorConfig sensors,
                                              const ProtocolConfig& protocol) noexcept {
     if (!protocol.noisy_evaluations) sensors.noise = 0.0;
     return sensors;
   }
 
+  /// Throws std::logic_error if an exception has ended a decision in the middle.
   void require_whole() const {
     if (in_decision_) {
       core::fail(std::logic_error("the trial was ended within a decision: make a new one"));
@@ -185,7 +191,8 @@ class AcrobotTrial {
 
   environments::AcrobotSensors& sensors() noexcept { return is_test_ ? test_sensors_ : sensors_; }
 
-  /// Chooses the next torque. False if `last` learning episodes are done, with their tests.
+  /// Chooses the next torque, in a new episode if none is running. Returns false if `last` learning
+  /// episodes are done, with their tests.
   bool begin_decision(int last) {
     if (!in_episode_) {
       if (!is_test_ && episode_ >= last) return false;
@@ -198,7 +205,8 @@ class AcrobotTrial {
     return true;
   }
 
-  /// Begins a learning or a test episode, with the goal tolerance of the learning episode.
+  /// Begins a learning episode or, if a test is due, a test episode, with the goal tolerance of the
+  /// latest learning episode.
   void begin_episode() {
     if (!is_test_) {
       if constexpr (requires { agent_.set_progress(0.0); }) {
@@ -215,7 +223,8 @@ class AcrobotTrial {
     in_episode_ = true;
   }
 
-  /// Learns the result of the decision that was begun; it may end the episode.
+  /// Observes and learns the result of the decision that was begun, and ends the episode if it is
+  /// over.
   void end_decision(const environments::StepResult& result) {
     sensors().observe(acrobot_.state(), next_observed_);
     if (!is_test_) {

@@ -19,7 +19,8 @@ namespace detail {
 
 SDNN_WIDE_VECTORS_BEGIN
 
-/// Multiplies four rows at a time, so that a piece of the input is loaded once for all of them.
+/// Implements multiply, below, for four rows at a time, so that a piece of the input is loaded once
+/// for all of them.
 SDNN_INLINE void multiply_body(const float* weights, std::size_t n_rows, std::size_t n_columns,
                                const float* input, float* out) noexcept {
   std::size_t i = 0;
@@ -65,14 +66,14 @@ SDNN_KERNEL(void, multiply,
              float* out),
             (weights, n_rows, n_columns, input, out))
 
-/// A dense float32 matrix-vector product, optimized for the processor. Its time is that of a hidden
-/// layer of this size in an ordinary network.
+/// A dense float32 matrix-vector product, as the hidden layer of an ordinary network computes it.
+/// Its time is a yardstick for the network's.
 ///
-/// Eigen's product depends on the options of the compilation; this one is chosen at run time, like
-/// the kernels of the network. `bench/` compares the two.
+/// The instruction set is chosen at run time, as for the kernels of the network; that of Eigen's
+/// product depends on the options of the compilation. `bench/` compares the two.
 class DenseProduct {
  public:
-  /// Weights and input uniform in [-1, 1). Throws std::invalid_argument, std::bad_alloc.
+  /// Draws weights and input, uniform in [-1, 1). Throws std::invalid_argument, std::bad_alloc.
   DenseProduct(std::size_t n_rows, std::size_t n_columns, std::uint64_t seed)
       : n_rows_(n_rows), n_columns_(n_columns) {
     core::require_in_range("n_rows", n_rows, std::size_t{1}, std::size_t{1} << 20);
@@ -88,13 +89,13 @@ class DenseProduct {
   std::span<const float> weights() const noexcept { return weights_.span(); }  ///< row by row
   std::span<const float> input() const noexcept { return input_.span(); }
 
-  /// The product; valid until the next call. Shape: (n_rows,).
+  /// Computes the product, which is valid until the next call. Shape: (n_rows,).
   std::span<const float> multiply() {
     tools::multiply(weights_.data(), n_rows_, n_columns_, input_.data(), out_.data());
     return out_.span();
   }
 
-  /// Times of `n_repetitions` products.
+  /// Times `n_repetitions` products.
   Times run(int n_repetitions) {
     return time_each(n_repetitions, [this](int) { keep(multiply()[0]); });
   }

@@ -1,5 +1,6 @@
-/// The paper's experiment B for a browser: a trial of SDNN-C and one of fuzzy Q-learning, which
-/// meet the same sensor noise. The page's worker calls the exported functions.
+/// The paper's experiment B in a browser: a trial of SDNN-C and one of fuzzy Q-learning, with the
+/// same sensor noise. The page's worker calls the exported functions; a parameter `side` selects
+/// the trial, 0 for SDNN-C and 1 for fuzzy Q-learning.
 #include "sdnn/environments/acrobot.hpp"
 
 #include <algorithm>
@@ -33,14 +34,14 @@ namespace {
 using namespace sdnn;
 using environments::AcrobotState;
 
-/// The seed of the first trial of a case, as `sdnn.runs.engine.trial_seed` derives it.
+/// Derives the seed of a case's first trial, as `sdnn.runs.engine.trial_seed` does.
 std::uint64_t trial_seed(std::uint32_t root_seed, std::string_view case_id) {
   const std::uint32_t case_word = core::detail::crc32(std::as_bytes(std::span(case_id)));
   const std::array<std::uint32_t, 6> entropy{root_seed, 0, 0, 0, case_word, 0};
   return core::Pcg64::generated_state(entropy)[0] >> 1U;
 }
 
-/// A trial that is watched decision by decision.
+/// A trial that records the decisions of the present episode, so that the page can show the motion.
 template <class Agent>
 class WatchedTrial {
  public:
@@ -58,7 +59,8 @@ class WatchedTrial {
     remember(before);
   }
 
-  /// Finishes the present or the next learning episode, with the test episode that is due.
+  /// Finishes the present episode or else the next learning episode, with the test episode that is
+  /// due after it.
   void finish_episode() {
     AcrobotState before = trial_.acrobot().state();
     trial_.advance(1, [&] {
@@ -67,7 +69,7 @@ class WatchedTrial {
     });
   }
 
-  /// Decisions in the present or last episode.
+  /// The number of decisions in the present or last episode.
   int n_decisions() const noexcept { return static_cast<int>(episode_.size()); }
 
   /// The state `n_steps` integration steps after a decision of this episode, or at the goal.
@@ -108,12 +110,15 @@ class WatchedTrial {
     double torque;
   };
 
+  /// Records a decision that was made in the state `before`. The first decision of an episode is
+  /// made at rest, whatever the state before the reset was.
   void remember(const AcrobotState& before) {
     const bool is_first = trial_.acrobot().decisions() == 1;
     if (is_first) episode_.clear();
     episode_.push_back({is_first ? AcrobotState::Zero().eval() : before, trial_.torque()});
   }
 
+  /// Returns the configuration of an acrobot whose decisions last for a single integration step.
   static environments::AcrobotConfig single_steps() {
     environments::AcrobotConfig config;
     config.decision_interval = config.integration_step;
@@ -121,8 +126,8 @@ class WatchedTrial {
   }
 
   tools::AcrobotTrial<Agent> trial_;
-  environments::Acrobot motion_;
-  std::vector<Decision> episode_;  // its decisions so far, or those of the last one
+  environments::Acrobot motion_;   // repeats a decision step by step
+  std::vector<Decision> episode_;  // the decisions of the present or last episode
 };
 
 /// The two trials of a case.
@@ -175,10 +180,11 @@ std::array<double, 4> shown_state;
 
 extern "C" {
 
-/// Where the page writes the case's id and reads the digest: 64 bytes.
+/// Returns the buffer of 64 bytes to which the page writes the case's id, and from which it reads
+/// the digest.
 __attribute__((export_name("text"))) char* text() { return text_buffer.data(); }
 
-/// Begins both trials of the case whose id has `id_length` bytes in `text`.
+/// Begins both trials of the case whose id is the first `id_length` bytes of the buffer `text`.
 __attribute__((export_name("begin"))) void begin(int id_length, int n_sensors, double noise,
                                                  std::uint32_t root_seed, int is_robust,
                                                  int n_episodes) {
@@ -199,11 +205,11 @@ __attribute__((export_name("finish_episode"))) void finish_episode(int side) {
 __attribute__((export_name("is_finished"))) int is_finished(int side) {
   return experiment->with(side, [](auto& watched) { return watched.trial().finished() ? 1 : 0; });
 }
-/// Learning episodes begun.
+/// The number of learning episodes that have begun.
 __attribute__((export_name("episode"))) int episode(int side) {
   return experiment->with(side, [](auto& watched) { return watched.trial().episode(); });
 }
-/// Decisions in the present or last episode.
+/// The number of decisions in the present or last episode.
 __attribute__((export_name("n_decisions"))) int n_decisions(int side) {
   return experiment->with(side, [](auto& watched) { return watched.n_decisions(); });
 }
@@ -211,19 +217,20 @@ __attribute__((export_name("n_decisions"))) int n_decisions(int side) {
 __attribute__((export_name("torque"))) double torque(int side, int decision) {
   return experiment->with(side, [&](auto& watched) { return watched.torque(decision); });
 }
-/// Both angles and speeds `n_steps` integration steps after a decision of this episode: 4 doubles.
+/// The state `n_steps` integration steps after a decision of this episode: 4 doubles, theta1,
+/// theta2 (rad), theta1_dot, theta2_dot (rad/s), valid until the next call.
 __attribute__((export_name("state"))) const double* state(int side, int decision, int n_steps) {
   const AcrobotState now =
       experiment->with(side, [&](auto& watched) { return watched.state_after(decision, n_steps); });
   std::ranges::copy(now, shown_state.begin());
   return shown_state.data();
 }
-/// Test episodes so far.
+/// The number of test episodes so far.
 __attribute__((export_name("n_tests"))) int n_tests(int side) {
   return experiment->with(
       side, [](auto& watched) { return static_cast<int>(watched.trial().rows().size()); });
 }
-/// Steps of a test episode; minus the steps where it did not reach the goal.
+/// The number of steps of a test episode, negative if it did not reach the goal.
 __attribute__((export_name("test_steps"))) int test_steps(int side, int test) {
   return experiment->with(side, [&](auto& watched) {
     const tools::TestRow& row = watched.trial().rows()[static_cast<std::size_t>(test)];

@@ -1,4 +1,4 @@
-/// SHA-256, for the digests of rows that Python prints.
+/// SHA-256, with which the page compares rows with those that Python has computed.
 #pragma once
 
 #include <algorithm>
@@ -24,7 +24,7 @@ inline constexpr std::array<std::uint32_t, 64> kSha256Constants{
     0x19a4c116, 0x1e376c08, 0x2748774c, 0x34b0bcb5, 0x391c0cb3, 0x4ed8aa4a, 0x5b9cca4f, 0x682e6ff3,
     0x748f82ee, 0x78a5636f, 0x84c87814, 0x8cc70208, 0x90befffa, 0xa4506ceb, 0xbef9a3f7, 0xc67178f2};
 
-/// Mixes a block of 64 bytes into the state.
+/// Mixes a block of 64 bytes into the state; the names of words are those of FIPS 180-4.
 inline void mix_block(std::array<std::uint32_t, 8>& state, std::span<const std::uint8_t> block) {
   std::array<std::uint32_t, 64> schedule{};
   for (std::size_t i = 0; i < 64; ++i) schedule[i / 4] = (schedule[i / 4] << 8U) | block[i];
@@ -55,7 +55,7 @@ inline void mix_block(std::array<std::uint32_t, 8>& state, std::span<const std::
 
 }  // namespace detail
 
-/// The SHA-256 of `bytes` as 64 hexadecimal digits. Source: FIPS 180-4.
+/// Returns the SHA-256 of `bytes` as 64 hexadecimal digits. Source: FIPS 180-4.
 inline std::string sha256(std::vector<std::uint8_t> bytes) {
   const std::uint64_t n_bits = std::uint64_t{8} * bytes.size();
   bytes.push_back(0x80);

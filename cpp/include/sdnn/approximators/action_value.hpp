@@ -10,8 +10,8 @@
 
 namespace sdnn::approximators {
 
-/// A learnable table of action values over continuous states in [0, 1]^l: a model that many threads
-/// may read at once, each through a separate workspace.
+/// A learnable function Q(s, a) of continuous states s in [0, 1]^l and discrete actions a: a model
+/// that many threads may read at once, each through a separate workspace.
 ///
 /// - q.n_actions(): number of actions
 /// - q.n_inputs(): l, the size of a state
@@ -37,8 +37,8 @@ concept ActionValue =
 
 /// An approximator whose values are functions of integers, of which the largest are found faster.
 ///
-/// - q.count(state, workspace, averaged): computes the integer of every action, as WindowCounts in
-/// workspace.counts(); `averaged` selects the average of the weights
+/// - q.count(state, workspace, averaged): computes the integer of every action; afterwards
+///   workspace.counts(), a WindowCounts, has them; `averaged` selects the average of the weights
 /// - q.value_of_count(count): Q(state, a) for the integer `count` of a
 /// - q.values_rise(): whether no value is below that of a smaller integer
 template <class Q>

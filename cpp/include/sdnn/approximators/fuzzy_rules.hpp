@@ -43,7 +43,7 @@ struct FuzzyRulesConfig {
   bool operator==(const FuzzyRulesConfig&) const = default;
 };
 
-/// The rules that fire in a state, with their truth values; the workspace of a user.
+/// The rules that fire in a state, with their truth values. A reader reuses it as a buffer.
 struct FiredRules {
   std::vector<std::size_t> rules;
   std::vector<double> truth_values;  ///< truth values of `rules`, whose sum is 1 up to rounding
@@ -51,21 +51,23 @@ struct FiredRules {
   std::size_t size() const noexcept { return rules.size(); }
 };
 
-/// n_sets^d rules, one per cell of the grid of sets, with v(rule, action) in 32-bit floats.
+/// A table of n_sets^d rules, one per combination of a set for each input, with the values v(rule,
+/// action) of all actions as 32-bit floats.
 ///
-/// A rule's truth value is the product of the memberships of the inputs in its sets. Neighbouring
-/// triangles overlap by one half, so an input belongs to two sets, or to one at a centre: at most
-/// 2^d rules fire, and only these are read or written. All values start at 0; rules that never fire
-/// cost no memory where the operating system hands out zero pages lazily.
-/// Source: method.md, section 3. The table has 4 n_actions n_sets^d bytes: 45 MB at d = 6. Thread
-/// safety: const functions may be called by many threads at once.
+/// A rule's truth value is the product of the memberships of the inputs in its sets. The triangle
+/// of a set is 1 at its centre and falls to 0 at the neighbouring centres. So an input belongs to
+/// two sets, or at a centre to a single set: at most 2^d rules fire, and only these are read or
+/// written. All values start at 0; rules that never fire cost no memory where the operating system
+/// provides zero pages on first use. Source: method.md, section 3. The table has 4 n_actions
+/// n_sets^d bytes: 45 MB at d = 6. Thread safety: const functions may be called by many threads at
+/// once.
 class FuzzyRules {
  public:
   /// v(rule, action), a row per rule.
   using Table = Eigen::Array<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-  /// Throws std::invalid_argument naming the impossible size; std::length_error naming rules, bytes
-  /// and limit, before any allocation; std::bad_alloc.
+  /// Makes rules whose values are 0. Throws std::invalid_argument naming the impossible size;
+  /// std::length_error naming rules, bytes and limit, before any allocation; std::bad_alloc.
   explicit FuzzyRules(const FuzzyRulesConfig& config)
       : config_(checked(config)),
         n_rules_(core::grid_cells("n_sets or n_inputs", "rules",
@@ -78,6 +80,7 @@ class FuzzyRules {
   std::size_t n_sets() const noexcept { return static_cast<std::size_t>(config_.n_sets); }
   std::size_t n_actions() const noexcept { return static_cast<std::size_t>(config_.n_actions); }
   std::size_t n_rules() const noexcept { return n_rules_; }
+  /// The largest number of rules that fire in a state.
   std::size_t max_fired() const noexcept { return std::size_t{1} << n_inputs(); }
 
   template <class Self, class Archive>
@@ -85,9 +88,10 @@ class FuzzyRules {
     archive.finite("values", {self.n_rules_, self.n_actions()}, self.table_.span());
   }
 
-  /// Writes the rules that fire in `state`. Rule numbers are row-major in the sets (last input
-  /// fastest); where an input lies between two centres the rules of the lower one come first, and
-  /// the first input is the fastest to alternate.
+  /// Writes the rules that fire in `state`, and their truth values. The number of a rule has a
+  /// digit in base n_sets for each input, its set; the last input has the lowest digit. With two
+  /// inputs between two centres each, lower sets (i, j), the order is (i, j), (i + 1, j), (i, j +
+  /// 1), (i + 1, j + 1). Truth values are products in the order of the inputs.
   ///
   /// Shape: state (d,) in [0, 1]. Throws std::invalid_argument otherwise; then `fired` is
   /// unchanged. Allocates nothing once `fired` has room for max_fired().
@@ -99,10 +103,10 @@ class FuzzyRules {
     for (const double x : state) {
       const double position = x * n_gaps;
       const std::size_t lower = std::min(static_cast<std::size_t>(position), n_sets() - 2);
-      const double membership = position - static_cast<double>(lower);  // in the upper set
-      for (std::size_t& rule : fired.rules) rule = rule * n_sets() + lower;
+      const double membership = position - static_cast<double>(lower);       // in the upper set
+      for (std::size_t& rule : fired.rules) rule = rule * n_sets() + lower;  // the next digit
       if (membership == 0.0) continue;
-      if (membership == 1.0) {  // x = 1
+      if (membership == 1.0) {  // at x = 1, where `lower` is the last set but one
         for (std::size_t& rule : fired.rules) ++rule;
         continue;
       }

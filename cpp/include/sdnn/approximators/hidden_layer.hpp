@@ -22,20 +22,23 @@
 
 namespace sdnn::approximators {
 
-/// A layer of n units h_i = w_i . x_SD - w_i0 whose weights and thresholds are integers.
+/// A layer of n units with potentials h_i = w_i . x_SD - w_i0, whose weights and thresholds are
+/// integers.
 ///
 /// Every sum is exact, so its order does not matter. The units form blocks of 64; a block stores
-/// its weights by columns (a cache line has an input unit and 64 hidden units), because a pass
-/// reads only the columns that are not neutral. A weight is a byte, -127 to 127, plus 128 times a
-/// *high byte*. High bytes are in a second layer. Since few are not 0 in training, blocks list
-/// these, and a pass reads the lists. A correction throws and changes nothing if a weight would
-/// exceed two bytes, or a potential 32 bits.
+/// its weights by columns (a cache line has the weights of 64 hidden units for an input unit),
+/// because a pass reads only the columns that are not neutral.
+///
+/// A weight is a low byte, -127 to 127, plus 128 times a *high byte*, which lies in a second array
+/// of the same layout. In training most high bytes are 0. Each block therefore lists the others,
+/// and a pass reads the list in place of the array. A correction throws and changes nothing if a
+/// weight would exceed two bytes, or a potential 32 bits.
 ///
 /// Source: section 3.1 (layer 4, z) and Eqs. (2), (3).
 class HiddenLayer {
  public:
-  /// The units of a block, and the largest |weight| that fits into two bytes.
   static constexpr std::size_t kBlockUnits = approximators::kBlockUnits;
+  /// The largest |weight| that fits into a low and a high byte.
   static constexpr std::int32_t kWeightLimit = 127 * 128 + 127;
 
   /// Sets all weights and thresholds to zero. Each of the first `n_double` columns is half of the
@@ -52,7 +55,8 @@ class HiddenLayer {
     const std::size_t n_bytes = core::checked_product(n_blocks_, block_bytes());
     bytes_ = core::AlignedBuffer<std::int8_t>(n_bytes);
     high_bytes_ = core::AlignedBuffer<std::int8_t>(n_bytes);
-    // Above this number, adding whole columns of high bytes is faster.
+    // With more listed bytes in a block than a quarter of its columns, a chosen number, a pass adds
+    // whole columns of high bytes.
     high_lists_ = HighByteLists(n_blocks_, n_columns / 4);
     may_have_high_.assign(n_units, 0);
     thresholds_.assign(n_units, 0);
@@ -75,7 +79,7 @@ class HiddenLayer {
     return bytes_[at] + (may_have_high_[unit] ? kHighByte * high_bytes_[at] : 0);
   }
   std::int32_t threshold(std::size_t unit) const noexcept { return thresholds_[unit]; }
-  /// The weights of a block's units, of which the last block may have fewer, for a column.
+  /// Returns the weights of the 64 units of a block for a column; those beyond n_units() are 0.
   std::array<std::int32_t, kBlockUnits> weights_of(std::size_t block,
                                                    std::size_t column) const noexcept {
     std::array<std::int32_t, kBlockUnits> weights;
@@ -90,13 +94,13 @@ class HiddenLayer {
   void set_weight(std::size_t unit, std::size_t column, std::int32_t value) {
     core::require_in_range("weight", value, -weight_limit_, weight_limit_);
     if (std::abs(value) > largest_weight_[unit]) note_largest(unit, std::abs(value));
-    // High bytes are written only if they are needed: alternating pages of both layers would share
-    // cache sets.
+    // The array of high bytes is written only if that is needed. Writing a page of each array in
+    // turn would be slow, because these pages share cache sets.
     if (may_have_high_[unit]) set_high_byte(unit, column, 0);
     store(unit, column, value);
   }
-  /// Adds sign * changes to the weights of a column. Shape: changes (n,). Throws
-  /// std::invalid_argument if a weight would exceed weight_limit().
+  /// Adds sign * changes[i] to the weight of every unit i for a column. Shape: changes (n,). Throws
+  /// std::invalid_argument if a weight would exceed weight_limit(); units before it have changed.
   void add_to_column(std::size_t column, std::span<const std::int32_t> changes, int sign) {
     assert(changes.size() == n_units_);
     const std::int32_t limit = std::min(kByteLimit, weight_limit_);
@@ -112,7 +116,7 @@ class HiddenLayer {
       if (std::abs(value) > largest_weight_[unit]) note_largest(unit, std::abs(value));
     }
   }
-  /// Whether |value| is below 2^30.
+  /// Whether a value may be a threshold: its magnitude is below 2^30.
   static constexpr bool is_threshold(std::int32_t value) noexcept {
     return value >= -kThresholdLimit && value <= kThresholdLimit;
   }
@@ -122,8 +126,8 @@ class HiddenLayer {
     thresholds_[unit] = value;
   }
 
-  /// Writes to all memory that learning may need, so that no decision is the first to use a page.
-  /// It changes no result.
+  /// Writes to all memory that learning may need, so that the operating system provides its pages
+  /// now and not during a decision. It changes no value.
   void touch_memory() noexcept {
     constexpr std::size_t kPage = 4096;
     for (std::size_t at = 0; at < high_bytes_.size(); at += kPage) {
@@ -148,7 +152,7 @@ class HiddenLayer {
     if (n_high_bytes() > 0) add_listed_high_bytes(input, out);
   }
 
-  /// Whether update would keep the |weights| of the unit that it moves within `limit`.
+  /// Whether update, with this input and step, would keep the |weights| of the unit within `limit`.
   bool has_room(std::size_t unit, const coding::SignedColumns& input, std::int32_t step,
                 std::int32_t limit) const {
     return largest_weight_[unit] + growth(step) <= limit ||
@@ -156,8 +160,8 @@ class HiddenLayer {
   }
 
   /// Adds step * x to w_i, twice as much in double columns, and subtracts step from w_i0, for every
-  /// i in `units`. Units and columns must differ, and double columns precede others in the input's
-  /// lists.
+  /// i in `units`. No unit and no column may be repeated, and double columns precede others in the
+  /// input's lists.
   ///
   /// Source: Eqs. (2), (3). Throws std::overflow_error before any change if a weight or threshold
   /// would leave its range. Requires |step| <= 64. It is fastest for `units` in rising order.
@@ -167,6 +171,9 @@ class HiddenLayer {
     for (const std::uint32_t unit : units) require_room(unit, changes, step);
     for (std::size_t k = 0; k < units.size();) {  // neighbours in a block share its cache lines
       const std::size_t block = units[k] / kBlockUnits;
+      // Units with high bytes, or whose low bytes could overflow, are changed one by one; the
+      // others of the block have -1 in the mask. Their number is counted, and the last of them
+      // kept.
       detail::Bytes mask{};
       std::size_t n_changed = 0, changed = 0;
       for (; k < units.size() && units[k] / kBlockUnits == block; ++k) {
@@ -192,7 +199,7 @@ class HiddenLayer {
   static constexpr std::int32_t kThresholdLimit = (std::int32_t{1} << 30) - 1;
   static constexpr std::int32_t kByteLimit = 127;
   static constexpr std::int32_t kHighByte = 128;
-  static constexpr int kLargestGroup = 4;
+  static constexpr int kLargestGroup = 4;  // columns that a pass may add in 8 bits; see add_columns
 
   std::size_t byte_index(std::size_t unit, std::size_t column) const noexcept {
     return unit / kBlockUnits * block_bytes() + column * kBlockUnits + unit % kBlockUnits;
@@ -201,7 +208,7 @@ class HiddenLayer {
   /// The bytes of a block: its columns, and a column of zeros, for the padding of lists of columns.
   std::size_t block_bytes() const noexcept { return (n_columns_ + 1) * kBlockUnits; }
 
-  /// Adds sign * the weights of the columns to out_i, without high bytes that are listed.
+  /// Adds sign * the weights of the columns to out_i, except for high bytes that are in lists.
   void add_signed(std::span<const std::uint32_t> columns, int sign,
                   std::span<std::int32_t> out) const {
     while (!columns.empty()) {
@@ -224,13 +231,15 @@ class HiddenLayer {
     }
   }
 
-  /// Adds the listed high bytes, each as often as the input has its column.
+  /// Adds 128 times the high bytes that are in lists, each as often as the input has its column.
+  /// The columns are counted in ranges of 8192, so that the counts need a fixed array on the stack.
   void add_listed_high_bytes(const coding::SignedColumns& input,
                              std::span<std::int32_t> out) const {
     std::array<std::int16_t, 8192> counts;
     for (std::size_t first = 0; first < n_columns_; first += counts.size()) {
       const std::size_t n = std::min(counts.size(), n_columns_ - first);
       std::fill_n(counts.begin(), n, std::int16_t{0});
+      // Columns below `first` wrap around to large numbers, so one comparison excludes both sides.
       const auto count = [&](std::span<const std::uint32_t> columns, int change) {
         for (const std::uint32_t column : columns) {
           if (column - first >= n) continue;
@@ -286,24 +295,28 @@ class HiddenLayer {
     }
   }
 
-  /// Adds to the units of the block whose mask is -1, modulo 256: the result fits by the bounds.
+  /// Adds the change to the low bytes of the units of a block whose mask is -1. Bytes are added
+  /// modulo 256, but none overflows, as the units' bounds have shown.
   void add_to_units(std::size_t block, const ColumnChange& change, detail::Bytes mask) noexcept {
+    // A mask of -1, all ones, becomes the amount, and a mask of 0 stays 0.
     for (std::int8_t& byte : mask) byte = static_cast<std::int8_t>(byte & change.amount);
     add_to_columns(bytes_.data() + block * block_bytes(), change.columns.data(),
                    change.columns.size(), mask);
   }
 
+  /// Adds the change to a unit's weights, with a carry into their high bytes.
   void add_with_high_bytes(std::size_t unit, const ColumnChange& change) noexcept {
     for (const std::uint32_t column : change.columns) {
       store(unit, column, bytes_[byte_index(unit, column)] + change.amount);
     }
   }
 
-  /// Sets the byte of a weight; the part that exceeds a byte is added to the high byte.
+  /// Sets the low byte of a weight to `value`; if that does not fit, the multiple of 128 that is
+  /// nearest towards 0 is carried into the high byte.
   void store(std::size_t unit, std::size_t column, std::int32_t value) noexcept {
     const std::size_t at = byte_index(unit, column);
     if (std::abs(value) > kByteLimit) {
-      const std::int32_t change = value / kHighByte;  // towards 0
+      const std::int32_t change = value / kHighByte;
       value -= change * kHighByte;
       may_have_high_[unit] = 1;
       set_high_byte(unit, column, high_bytes_[at] + change);
@@ -311,7 +324,7 @@ class HiddenLayer {
     bytes_[at] = static_cast<std::int8_t>(value);
   }
 
-  /// Sets the second byte of a weight, also in the list of second bytes that are not 0.
+  /// Sets the high byte of a weight, also in the list of high bytes that are not 0.
   void set_high_byte(std::size_t unit, std::size_t column, std::int32_t value) noexcept {
     std::int8_t& byte = high_bytes_[byte_index(unit, column)];
     const HighByte high{static_cast<std::uint32_t>(column),
@@ -321,6 +334,7 @@ class HiddenLayer {
     byte = high.value;
   }
 
+  /// Finds the largest |weight| of a unit, column by column.
   std::int32_t largest_weight(std::size_t unit) const noexcept {
     std::int32_t largest = 0;
     for (std::size_t j = 0; j < n_columns_; ++j) {
@@ -329,8 +343,8 @@ class HiddenLayer {
     return largest;
   }
 
-  /// Updates the bound of a unit, and the number of columns of its block that may be added in 8
-  /// bits.
+  /// Sets the bound of a unit's weights. If it is too large for the number of columns of its block
+  /// that are added in 8 bits, that number is halved until their sum fits; it never grows again.
   void note_largest(std::size_t unit, std::int32_t bound) noexcept {
     largest_weight_[unit] = bound;
     const auto narrow = [](int& group, std::int32_t limit) {
@@ -340,9 +354,10 @@ class HiddenLayer {
     narrow(high_group_of_block_[unit / kBlockUnits], (bound + kByteLimit) / kHighByte);
   }
 
-  /// Throws unless the correction keeps the unit in range. The stored bound of a unit only grows,
-  /// so the true maximum is computed when the bound reaches the limit, and the corrected weights
-  /// when the maximum does: a correction towards 0 is always possible.
+  /// Throws std::overflow_error unless the correction keeps the unit in range. The cheap test comes
+  /// first: the stored bound. It grows with each correction, so where it reaches the limit the true
+  /// maximum replaces it. Where that reaches the limit too, the corrected weights are computed, so
+  /// that a correction towards 0 is always possible.
   void require_room(std::size_t unit, std::span<const ColumnChange> changes, std::int32_t step) {
     const std::int32_t room = weight_limit_ - growth(step);
     if (largest_weight_[unit] > room) largest_weight_[unit] = largest_weight(unit);
@@ -363,9 +378,10 @@ class HiddenLayer {
     });
   }
 
-  /// Raises the unit's bound by `growth`. Before the bound costs speed, the true maximum is
-  /// computed; a unit within an eighth of a limit moves on to the next limit, so that this stays
-  /// rare.
+  /// Raises the unit's bound by `growth`. Bounds above 127 / 4, 127 / 2 and 127 make passes slower,
+  /// so before the bound crosses such a limit, the true maximum is computed. If that is within an
+  /// eighth of the limit, the bound crosses it all the same, because the maximum would soon have to
+  /// be computed again.
   void raise_bound(std::size_t unit, std::int32_t growth) {
     const std::int32_t before = largest_weight_[unit];
     std::int32_t bound = before + growth;
@@ -378,8 +394,8 @@ class HiddenLayer {
     note_largest(unit, bound);
   }
 
-  /// Computes the largest |weight| of a unit, and lowers the bounds of the other units of its
-  /// block, some of which may grow soon.
+  /// Computes the largest |weight| of a unit before a correction. The same pass lowers the bounds
+  /// of all units of its block, with `growth` added, as some may be corrected in the same update.
   std::int32_t look_up(std::size_t unit, std::int32_t growth) {
     if (may_have_high_[unit]) return largest_weight(unit);
     const std::size_t block = unit / kBlockUnits;
@@ -399,7 +415,7 @@ class HiddenLayer {
   std::size_t n_blocks_ = 0;
   std::int32_t weight_limit_;
   core::AlignedBuffer<std::int8_t> bytes_;       ///< [block][column, then zeros][unit in block]
-  core::AlignedBuffer<std::int8_t> high_bytes_;  ///< as `bytes_`, multiples of kHighByte
+  core::AlignedBuffer<std::int8_t> high_bytes_;  ///< laid out as `bytes_`; they count 128
   HighByteLists high_lists_;
   std::vector<std::uint8_t> may_have_high_;  ///< whether a unit ever had a high byte
   std::vector<std::int32_t> thresholds_;

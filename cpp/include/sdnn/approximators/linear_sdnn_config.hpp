@@ -56,15 +56,16 @@ struct LinearSDNNConfig {
   bool operator==(const LinearSDNNConfig&) const = default;
 };
 
-/// Returns the configuration with a number of units if it has none. Patterns of too few units are
-/// correlated by chance, and more columns take more time.
+/// Returns the configuration with a chosen number of pattern units if n_pattern_units is 0. The
+/// number is a compromise: patterns of too few units are correlated by chance, and more columns
+/// take more time.
 inline LinearSDNNConfig with_pattern_units(LinearSDNNConfig config) noexcept {
   if (config.n_pattern_units == 0) {
     // The number of inputs is not checked yet, hence 64 bits.
     const std::int64_t n_partners = coding::n_partners_of(config);
     const std::int64_t n_groups = std::max<std::int64_t>(1, config.n_inputs * n_partners);
-    // Whole words of 64 units: as many as make about 3,072 columns; or 256, which are enough to
-    // keep chance correlations small, as far as these make no more than 14,336 columns.
+    // The result is a multiple of 64, a word. `usual` units make about 3,072 columns. `enough`
+    // units keep chance correlations small: 256, or as many as make at most 14,336 columns.
     const std::int64_t usual = (3072 / n_groups + 32) / 64 * 64;
     const std::int64_t enough = std::min<std::int64_t>(256, 14336 / n_groups / 64 * 64);
     config.n_pattern_units =
@@ -73,8 +74,9 @@ inline LinearSDNNConfig with_pattern_units(LinearSDNNConfig config) noexcept {
   return config;
 }
 
-/// The number of weights of a readout with these numbers of actions in each dimension, including
-/// weights that are always 0. It is a double, because the fields may not be checked yet.
+/// Returns the number of weights of a readout with n_actions[d] actions in dimension d, including
+/// the weights of padding columns, which are always 0. The result is a double, because the fields
+/// may not be checked yet and their product may not fit into an integer.
 inline double n_linear_weights(const LinearSDNNConfig& config,
                                std::span<const std::size_t> n_actions) {
   double n_rows = 0.0;
@@ -85,10 +87,10 @@ inline double n_linear_weights(const LinearSDNNConfig& config,
          coding::n_partners_of(config);
 }
 
-/// Throws std::length_error if `n_weights` weights, the patterns of `n_bins` bins and a trace have
-/// more bytes than config.max_table_bytes.
+/// Throws std::length_error if `n_weights` weights, their average (if there is one), a trace and
+/// the patterns of `n_bins` bins together have more bytes than config.max_table_bytes.
 inline void require_room(const LinearSDNNConfig& config, double n_bins, double n_weights) {
-  // The weights, a trace and perhaps the average of the weights.
+  // Weights, traces and averages have four bytes each.
   const double n_copies = config.averaging_interval > 0 ? 3.0 : 2.0;
   core::require_table_bytes(
       "max_pairs, n_pattern_units, n_inputs, n_actions, action_window or n_interpolated",
@@ -96,7 +98,8 @@ inline void require_room(const LinearSDNNConfig& config, double n_bins, double n
       4.0 * n_copies * n_weights + coding::pattern_bytes_of(config, n_bins),
       config.max_table_bytes);
 }
-/// Checks the room for actions of a single dimension, before the code is made.
+/// Checks the room, as above, for the config's n_actions actions of a single dimension. The shared
+/// functions of state_wiring.hpp call it before they make the code.
 inline void require_room(const LinearSDNNConfig& config, double n_bins) {
   const std::size_t n_actions[] = {static_cast<std::size_t>(config.n_actions)};
   require_room(config, n_bins, n_linear_weights(config, n_actions));

@@ -10,8 +10,8 @@
 
 namespace sdnn::approximators {
 
-/// The function g: a straight line that maps [u_low, u_high] onto [q_low, q_high], saturating
-/// outside.
+/// The function g from a number of active units to a value: a straight line from (u_low, q_low) to
+/// (u_high, q_high), constant outside.
 ///
 /// Source: section 4.2 (the paper's g: 20 <= u <= 280 onto [-20, 20]); method.md, section 1.6.
 class OutputScale {
@@ -34,7 +34,8 @@ class OutputScale {
   double q_low() const noexcept { return q_low_; }
   double q_high() const noexcept { return q_high_; }
 
-  /// The change of the value by a unit.
+  /// The change of the value for an additional active unit. The quotients are taken first, so that
+  /// q_high - q_low cannot overflow.
   double step() const noexcept {
     return q_high_ / (u_high_ - u_low_) - q_low_ / (u_high_ - u_low_);
   }
@@ -47,22 +48,22 @@ class OutputScale {
     return (q_low_ * (u_high_ - n_firing) + q_high_ * (n_firing - u_low_)) / (u_high_ - u_low_);
   }
 
-  /// The number of units, not rounded, of `value` clipped to [q_low, q_high]. For every u in
-  /// [u_low, u_high], exact_inverse(g(u)) is within 1e-9 of u. Requires a number.
+  /// Returns the number of units, not rounded, whose value is `value` clipped to [q_low, q_high].
+  /// For every u in [u_low, u_high], exact_inverse(g(u)) is within 1e-9 of u. Requires a number.
   double exact_inverse(double value) const noexcept {
     assert(!std::isnan(value));
     const double clipped = std::clamp(value, q_low_, q_high_);
     return u_low_ + (clipped - q_low_) * (u_high_ - u_low_) / (q_high_ - q_low_);
   }
 
-  /// The number of units whose value is nearest to `value` clipped to [q_low, q_high]; halves are
-  /// rounded up. For every u in [u_low, u_high], inverse(g(u)) == u. Requires a number.
+  /// Returns the number of units whose value is nearest to `value` clipped to [q_low, q_high];
+  /// halves are rounded up. For every u in [u_low, u_high], inverse(g(u)) == u. Requires a number.
   int inverse(double value) const noexcept {
     return static_cast<int>(std::floor(exact_inverse(value) + 0.5));
   }
 
  private:
-  static constexpr double kLargest = 1e301;
+  static constexpr double kLargest = 1e301;  // times 2^20 units, it is still a finite double
 
   int u_low_;
   int u_high_;

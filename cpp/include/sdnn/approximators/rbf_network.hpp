@@ -61,12 +61,15 @@ struct RBFNetworkConfig {
 
 /// Normalized Gaussian bases on an even grid over [0, 1]^d and the action's range.
 ///
-/// A joint basis is the product of one Gaussian per dimension, divided by the sum of all joint
-/// bases: n_bases^(d+1) in number. This sum is a product too, so a normalized joint basis is the
-/// product of Gaussians normalized in each dimension. Hence, with phi(s) the normalized bases of
-/// the state, an outer product, the weights are multiplied once, u = phi(s)^T W, and every action
-/// has psi(a)^T u. All sums start at 0 and add in the order of the bases. They use columns of
-/// Eigen's arrays, and not its products, whose order depends on the instruction set.
+/// Each of the n_bases^(d+1) joint bases is the product of one Gaussian per dimension, divided by
+/// the sum of these products. The sum is the product of the dimensions' sums, so a normalized joint
+/// basis is the product of Gaussians normalized in each dimension. Let phi(s) be the normalized
+/// bases of the state, the outer product of those of its inputs, and psi(a) those of the action.
+/// Then Q(s, a) = phi(s)^T W psi(a): u = phi(s)^T W is computed once, and psi(a)^T u for each
+/// action.
+///
+/// All sums start at 0 and add in the order of the bases. They use columns of Eigen's arrays, and
+/// not its products, whose order depends on the instruction set.
 ///
 /// Source: method.md, section 4. Cost at d = 6: 16,384 multiply-adds for all actions. Thread
 /// safety: const functions may be called by many threads at once, with a workspace each.
@@ -111,7 +114,7 @@ class RBFNetwork {
   std::size_t n_bases() const noexcept { return static_cast<std::size_t>(config_.n_bases); }
   std::size_t n_actions() const noexcept { return static_cast<std::size_t>(config_.n_actions); }
   std::size_t n_joint_bases() const noexcept { return n_joint_bases_; }
-  /// A number that no other network has.
+  /// A number that no other network of the process has.
   std::uint64_t identity() const noexcept { return identity_.number(); }
 
   /// Row-major over (input 1, ..., input d, action). Shape: (n_bases^(d+1),).
@@ -185,7 +188,7 @@ class RBFNetwork {
   }
 
  private:
-  static constexpr int kUnrolled = 4;  // the paper's n_bases
+  static constexpr int kUnrolled = 4;  // the paper's n_bases, for which loops are compiled apart
   static constexpr double kLargestStep = 1e305;
   static constexpr double kLargestWeight = 1e300;  // limit of given weights, whose sums stay finite
 
@@ -240,8 +243,8 @@ class RBFNetwork {
     Eigen::Index size = 1;
     for (const double x : workspace.state_) {
       to_one_dimension(x, workspace.one_dimension_);
-      // The loop runs backwards, so that one array is enough: entry i becomes entries i n .. i n +
-      // n - 1.
+      // Entry i becomes the n entries from i n on. Backwards, no entry is overwritten before it is
+      // read, so that one array is enough.
       for (Eigen::Index i = size; i-- > 0;) {
         state_bases.segment(i * n, n) = state_bases[i] * workspace.one_dimension_.head(n);
       }

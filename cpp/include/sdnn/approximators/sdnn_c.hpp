@@ -34,16 +34,16 @@
 
 namespace sdnn::approximators {
 
-/// The numbers of outcomes of a network's corrections.
+/// Counts of the calls of a network's update, by their outcomes.
 struct CorrectionCounts {
-  std::uint64_t asked = 0;         ///< all calls of update
-  std::uint64_t changed = 0;       ///< units were corrected
-  std::uint64_t rounded_away = 0;  ///< the change was smaller than half a unit
-  std::uint64_t out_of_range = 0;  ///< the target was outside [q_low, q_high]
+  std::uint64_t asked = 0;         ///< all calls
+  std::uint64_t changed = 0;       ///< calls that corrected units
+  std::uint64_t rounded_away = 0;  ///< calls whose change of the value was rounded to no unit
+  std::uint64_t out_of_range = 0;  ///< calls whose new value would be outside [q_low, q_high]
   double mean_error = 0.0;         ///< mean |clipped target - Q| of about the last 1000
 };
 
-/// The network of section 3, a model for any number of users.
+/// The network SDNN-C of the paper's section 3, a model for any number of users.
 ///
 /// Wiring (code books, permutations) is fixed by config and seed and shared by copies. Each user
 /// reads the network through a separate Workspace, which caches the potentials of recent states and
@@ -56,8 +56,8 @@ struct CorrectionCounts {
 class SDNNC {
  public:
   /// The workspace of a user who reads or trains a network: the potentials of recent states, and
-  /// buffers. It fits this network at any time, and its copies, which an assertion checks. Its size
-  /// is fixed, so that a step allocates nothing.
+  /// buffers. It serves the network that made it and all copies of it, at any time; an assertion
+  /// checks the sizes. Its own size is fixed, so that a step allocates nothing.
   class Workspace {
    public:
     const ActivationCache& cache() const noexcept { return cache_; }
@@ -299,10 +299,10 @@ class SDNNC {
  private:
   using Cached = ActivationCache::Entry;
 
-  static constexpr std::uint64_t kMostErrors = 1000;  // averaged errors
+  static constexpr std::uint64_t kMostErrors = 1000;  // from here on the mean is exponential
 
-  /// The scale between firing units and values. By default, as in the paper, the lowest and the
-  /// highest fifteenth of the counts are not used.
+  /// Makes the scale between numbers of firing units and values. By default, as in the paper, it is
+  /// constant over the lowest and the highest fifteenth of the numbers.
   static OutputScale make_scale(const SDNNCConfig& config) {
     const int u_low = config.u_low.value_or(config.n_active_units / 15);
     core::require_in_range("u_low", u_low, 0, config.n_active_units);
@@ -320,9 +320,9 @@ class SDNNC {
     values_rise_ = std::ranges::is_sorted(value_of_count_);
   }
 
-  /// Takes weights and thresholds of the code before pairing. Shapes: weights (n, D), in the
-  /// paper's order, thresholds (n,). Throws std::invalid_argument for a weight or threshold out of
-  /// range; then nothing has changed.
+  /// Replaces weights and thresholds by those given for x_SD, the code before pairing. Shapes:
+  /// weights (n, D), in the paper's order, thresholds (n,). Throws std::invalid_argument for a
+  /// weight or threshold out of range; then nothing has changed.
   template <class Weight>
   void replace_parameters(std::span<Weight> weights, std::span<const std::int32_t> thresholds) {
     const std::size_t n_columns = code_->n_columns();
@@ -360,8 +360,8 @@ class SDNNC {
     });
   }
 
-  /// Makes units fire or not, so that Q(state, action) moves towards the target, and counts the
-  /// outcome. The arguments have been checked.
+  /// Makes units fire or stop firing, so that Q(state, action) moves towards the target, and counts
+  /// the outcome. The arguments have been checked.
   void correct(std::span<const double> state, Workspace& workspace, std::size_t action,
                double target, double rate) {
     const Cached entry = recall(state, workspace);
@@ -380,8 +380,8 @@ class SDNNC {
     counts_.mean_error += (error - counts_.mean_error) / n_counted;
   }
 
-  /// Corrects units so that `deficit` more units of the action's window fire, or fewer if it is
-  /// negative, as far as there are such units. Returns whether there are any.
+  /// Corrects units so that `deficit` more units of the action's window fire, or -deficit fewer if
+  /// it is negative, as far as there are units to correct. Returns whether any unit was corrected.
   bool move_count(const Cached& entry, Workspace& workspace, std::size_t action, int deficit) {
     const std::size_t first = actions_.first_unit(action);
     std::vector<std::uint32_t>& selected = workspace.selected_;
@@ -403,25 +403,26 @@ class SDNNC {
     return true;
   }
 
+  /// Returns the potentials of a state with the present weights, from the cache if possible.
   Cached recall(std::span<const double> state, Workspace& workspace) const {
     assert(fits(workspace));
     code_->bins_of(state, workspace.bins_);
     return workspace.cache_.recall(*code_, hidden_layer_, log_, workspace.bins_);
   }
 
-  /// The number of units that should fire for the value `new_value`, given that `n_firing` do.
+  /// Returns the number of units that should fire for `new_value`; `n_firing` fire now.
   int rounded_count(double new_value, int n_firing) {
     if (config_.rounding == Rounding::half_up) return scale_.inverse(new_value);
     const double exact = scale_.exact_inverse(new_value);
     if (config_.rounding == Rounding::random) {
       return static_cast<int>(std::floor(exact + rounding_.uniform()));
     }
-    constexpr double kNothing = 1e-9;  // largest rounding error of an unchanged value
+    constexpr double kNothing = 1e-9;  // largest error of exact_inverse for an unchanged value
     return static_cast<int>(exact > n_firing ? std::ceil(exact - kNothing)
                                              : std::floor(exact + kNothing));
   }
 
-  /// The number of firing units in an action's window.
+  /// Counts the firing units in an action's window. Throws std::invalid_argument for a bad action.
   int count_in_window(std::span<const std::int32_t> potentials, std::size_t action) const {
     core::require_below("action", action, n_actions());
     const std::size_t first = actions_.first_unit(action);

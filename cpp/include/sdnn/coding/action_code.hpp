@@ -20,7 +20,7 @@ namespace sdnn::coding {
 /// Source: section 3.1 (layer 4, y); method.md, section 1.4. Units are counted from 0.
 class ActionCode {
  public:
-  /// `n_actions` = 0 stands for all windows.
+  /// Makes a window for each of `n_actions` actions; with 0, every possible window is an action.
   ///
   /// Throws std::invalid_argument naming the impossible size.
   ActionCode(int n_hidden_units, int n_active_units, int n_actions = 0) {

@@ -21,10 +21,11 @@ struct AnchorConfig {
   bool circular = false;  ///< last anchor = first: for angles
 };
 
-/// (n_anchor_patterns - 1) * (n_interpolated + 1) patterns.
+/// Makes (n_anchor_patterns - 1) * (n_interpolated + 1) patterns, which lead from each anchor to
+/// the next. The bins of an anchor begin with the anchor itself; the last anchor has no bins.
 ///
-/// Between neighbouring anchors the units in which they differ flip in a random order; the j-th of
-/// n_interpolated + 1 nearly equal portions ends at floor(j * differing / (n_interpolated + 1)).
+/// The units in which two neighbouring anchors differ flip in a random order, in n_interpolated + 1
+/// nearly equal portions: the j-th ends at floor(j * differing / (n_interpolated + 1)).
 ///
 /// Source: section 3.1 (layer 2); method.md, section 1.2. Throws std::invalid_argument naming the
 /// impossible field.

@@ -28,10 +28,12 @@ inline void prefetch([[maybe_unused]] const void* address) noexcept {
 #endif
 }
 
-/// Patterns as bytes, whose inner products are moved towards given ones by swaps of two units.
+/// A search for patterns whose inner products approach given ones: it swaps two units of a pattern
+/// where that does not raise the squared error. Patterns are bytes, +1 and -1.
 class CorrelationSearch {
  public:
-  /// Takes the required correlations as inner products of signs, which are integers.
+  /// Rounds the required correlations to inner products of signs, which are integers. Shapes:
+  /// correlations (n_bins, n_bins).
   CorrelationSearch(std::span<const double> correlations, std::size_t n_bins, std::size_t n_units)
       : n_bins_(n_bins),
         n_units_(n_units),
@@ -43,8 +45,9 @@ class CorrelationSearch {
     }
   }
 
-  /// Starts pattern i as a copy of the preceding pattern with the largest correlation, inverted if
-  /// that is negative, or as a random balanced pattern if there is none.
+  /// Starts pattern i as a copy of the preceding pattern whose required correlation with it is the
+  /// largest in size, inverted if that is negative. If all are 0, it starts as a random balanced
+  /// pattern.
   void begin(std::size_t i, core::Random& random) {
     std::size_t nearest = i;
     for (std::size_t j = 0; j < i; ++j) {
@@ -69,9 +72,9 @@ class CorrelationSearch {
     }
   }
 
-  /// Tries swaps of two random units in patterns that `draw_pattern()` selects, judged by the
-  /// products with the first `n_others` patterns. Swaps are drawn in advance, so that their units
-  /// are prefetched from memory.
+  /// Tries `n_proposals` swaps of two random units in patterns whose numbers `draw_pattern()`
+  /// returns, judged by the products with the first `n_others` patterns. Some swaps are drawn in
+  /// advance, so that their units are prefetched from memory.
   template <class DrawPattern>
   void propose(std::size_t n_proposals, std::size_t n_others, core::Random& random,
                DrawPattern draw_pattern) {
@@ -101,6 +104,7 @@ class CorrelationSearch {
   }
 
  private:
+  /// A proposal to exchange units k and l of a pattern.
   struct Swap {
     std::size_t pattern, k, l;
   };
@@ -114,7 +118,7 @@ class CorrelationSearch {
     std::int8_t* const unit_k = unit(k);
     std::int8_t* const unit_l = unit(l);
     if (unit_k[i] == unit_l[i]) return;
-    const std::int64_t twice = unit_l[i] - unit_k[i];
+    const std::int64_t twice = unit_l[i] - unit_k[i];  // by which unit k changes: 2 or -2
     const auto step = [&](std::size_t j) { return twice * (unit_k[j] - unit_l[j]); };
     const std::int64_t* const products = &products_[i * n_bins_];
     const std::int64_t* const wanted = &wanted_[i * n_bins_];
@@ -136,7 +140,7 @@ class CorrelationSearch {
     std::swap(unit_k[i], unit_l[i]);
   }
 
-  /// The signs of unit k in all patterns.
+  /// The signs of unit k in all patterns. They are adjacent, as a swap needs those of two units.
   std::int8_t* unit(std::size_t k) noexcept { return signs_.data() + k * n_bins_; }
   const std::int8_t* unit(std::size_t k) const noexcept { return signs_.data() + k * n_bins_; }
 
@@ -182,7 +186,8 @@ inline PatternTable correlation_matrix_patterns(int n_units, std::span<const dou
   }
   const auto units = static_cast<std::size_t>(n_units);
   detail::CorrelationSearch search(correlations, n_bins, units);
-  // 20 proposals for each unit of a pattern, or fewer if these would take more than 4e8 steps.
+  // 20 proposals for each unit of a pattern, or fewer if these would take more than 4e8 steps (both
+  // are chosen): a proposal takes up to n_bins steps, and there are n_bins patterns.
   const std::uint64_t affordable = 400'000'000 / (std::uint64_t{n_bins} * n_bins * units) + 1;
   const std::size_t n_proposals =
       units * static_cast<std::size_t>(std::min<std::uint64_t>(20, affordable));

@@ -16,7 +16,8 @@
 
 namespace sdnn::coding {
 
-/// Unit k of a permuted pattern is unit `permutation[k]` of the pattern.
+/// The order of the units of a permuted pattern: its unit k is unit `permutation[k]` of the
+/// pattern.
 ///
 /// Source: sigma_mu_nu of section 3.1 (layer 3).
 using Permutation = std::vector<std::uint32_t>;
@@ -38,7 +39,8 @@ inline Permutation inverse(const Permutation& permutation) {
   return result;
 }
 
-/// Throws std::invalid_argument unless the permutation has each of `n_units` units once.
+/// Throws std::invalid_argument unless the permutation has each of the numbers 0 to `n_units` - 1
+/// exactly once.
 inline void require_permutation(const Permutation& permutation, std::size_t n_units) {
   core::require(permutation.size() == n_units, "permutation",
                 std::to_string(n_units) + " units long", permutation.size());

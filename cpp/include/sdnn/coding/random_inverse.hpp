@@ -21,8 +21,8 @@ struct RandomInverseConfig {
   int n_flipped = 5;   ///< r, units of each sign that differ between neighbours
 };
 
-/// The first pattern is random and balanced; each further pattern flips `n_flipped` units of each
-/// sign.
+/// Makes a chain of balanced patterns, one per bin: the first is random, and each further pattern
+/// is its predecessor with `n_flipped` random units of each sign flipped.
 ///
 /// Source: Nonaka, Tanaka, Morita 2011. The expected correlation of patterns d bins apart is
 /// (1 - 4 n_flipped / n_units)^d. Throws std::invalid_argument naming the impossible field.
@@ -37,7 +37,8 @@ inline PatternTable random_inverse_patterns(const RandomInverseConfig& config,
   PatternTable table(static_cast<std::size_t>(config.n_bins), n_units);
   fill_random(table, 0, true, random);
 
-  // The units of each sign. Each step moves the units to flip to the front, and swaps their signs.
+  // The numbers of the units of each sign. Each bin moves the units to flip to the front of both
+  // lists, and then exchanges these fronts, because the flipped units have the other sign.
   std::vector<std::size_t> positive;
   std::vector<std::size_t> negative;
   for (std::size_t k = 0; k < n_units; ++k) {

@@ -23,21 +23,23 @@ namespace sdnn::coding {
 
 /// The code x_SD of states in [0, 1]^l over ordered pairs of inputs, a table per input.
 ///
-/// In the paper all pairs (mu, nu), nu != mu, have a *group* of m units. Here each input may have
-/// fewer partners, given by *strides*: mu is modified by mu + stride, modulo l, so that every input
-/// is modified by p others and modifies p. With all l - 1 strides it is the paper's code.
+/// In the paper all pairs (mu, nu), nu != mu, have a *group* of m units. This class also allows
+/// fewer partners, given by *strides*: mu is modified by mu + stride, modulo l, for each of p
+/// strides, so that every input is modified by p others and modifies p others. With all l - 1
+/// strides it is the paper's code.
 ///
 /// In the paper's order groups are sorted by mu, then nu. Unit k of group g is unit g * m + k of
-/// x_SD: unit k of x^mu, modified by unit sigma_mu_nu[k] of x^nu. Stored, a group is in the order
-/// of the units that modify it: then all groups (mu, nu) of one nu are switched by one pattern,
-/// that of nu, their *gate*.
+/// x_SD: unit k of x^mu, modified by unit sigma_mu_nu[k] of x^nu. The stored group is sorted by the
+/// units that modify it: unit q is modified by unit q of x^nu. All groups (mu, nu) of one nu then
+/// have the same neutral units, those that are -1 in the pattern of nu, their *gate*.
 ///
-/// Sums and differences halve the number of columns to read or correct. The p units that unit q of
-/// x^nu modifies, one in each group (mu, nu), are neutral together. Two of them, x_i and x_j, are
-/// stored as (x_i + x_j) / 2 and (x_i - x_j) / 2, one of which is always neutral. This is the
-/// *paired code*, D columns too. Its first n_double_columns() are such halves: for each nu and each
-/// two of its groups m half sums, then m half differences, in the order of q. If p is odd, the
-/// group of the last mu of each nu has no partner and follows unchanged.
+/// The *paired code* halves the number of columns to read or correct. Unit q of x^nu modifies one
+/// unit in each of its p groups, and these are neutral together. Two of them, x_i and x_j, are
+/// replaced by (x_i + x_j) / 2 and (x_i - x_j) / 2. Of these at least one is always neutral, as x_i
+/// and x_j are both +1 or -1, or both neutral. The paired code has D columns too. Its first
+/// n_double_columns() are such halves: for each nu and each two of its groups m half sums, then m
+/// half differences, in the order of q. If p is odd, the group of the last mu of each nu has no
+/// partner and follows unchanged.
 class StateCode {
  public:
   /// Makes the wiring from tables, one per input, permutations, one per group in the paper's order,
@@ -56,13 +58,13 @@ class StateCode {
 
   std::size_t n_inputs() const noexcept { return tables_.size(); }
   std::size_t n_pattern_units() const noexcept { return tables_.front()->n_units(); }
-  /// k, the number of inputs that each input modifies, and by which it is modified; l - 1 in the
+  /// p, the number of inputs that each input modifies, and by which it is modified; l - 1 in the
   /// paper.
   std::size_t n_partners() const noexcept { return strides_.size(); }
   std::size_t n_groups() const noexcept { return n_inputs() * n_partners(); }
   /// The pairs (mu, nu) of all groups in the paper's order.
   std::span<const InputPair> groups() const noexcept { return groups_; }
-  /// D = m l k, the length of x_SD; m l (l - 1) in the paper.
+  /// D = m l p, the length of x_SD; m l (l - 1) in the paper.
   std::size_t n_columns() const noexcept { return n_pattern_units() * n_groups(); }
   /// The number of words of the paired code.
   std::size_t n_words() const noexcept { return n_groups() * code_.n_pair_words(); }
@@ -94,15 +96,17 @@ class StateCode {
     }
   }
 
-  /// The columns of a unit of x_SD in the paired code. If it is paired, x = first + sign * second,
-  /// and its weight is half of this sum of their weights; otherwise both are those of `first`.
+  /// The columns of the paired code that a unit of x_SD has become. For a `paired` unit, the value
+  /// is that of column `first` plus `sign` times that of column `second`, and the weight is half of
+  /// the same sum of their weights. Any other unit has value and weight of column `first`.
   struct PairedColumns {
     bool paired;
     std::size_t first, second;
     int sign;
   };
 
-  /// Throws std::invalid_argument if there is no such unit.
+  /// Finds the columns of a unit, numbered in the paper's order. Throws std::invalid_argument if
+  /// there is no such unit.
   PairedColumns columns_of(std::size_t unit) const {
     core::require_below("unit", unit, n_columns());
     const std::size_t m = n_pattern_units();
@@ -120,13 +124,15 @@ class StateCode {
   void encode(std::span<const Bin> bins, std::uint64_t* active,
               std::uint64_t* positive) const noexcept {
     code_.encode(bins, active, positive);
+    // Two groups of one gate become their half sum and half difference. Signs (+1, +1) become
+    // (+1, 0), (+1, -1) become (0, +1), (-1, +1) become (0, -1) and (-1, -1) become (-1, 0).
     const std::size_t width = code_.n_pair_words();
     for (std::size_t first = 0; first < 2 * n_inputs() * n_pairs() * width; first += 2 * width) {
       for (std::size_t w = first; w < first + width; ++w) {
         const std::uint64_t first_sign = positive[w];
         const std::uint64_t second_sign = positive[w + width];
         const std::uint64_t unlike = first_sign ^ second_sign;
-        active[w] ^= unlike;  // half of the sum where the signs are equal
+        active[w] ^= unlike;  // the half sum is neutral where the signs differ
         positive[w] = first_sign & second_sign;
         active[w + width] = unlike;
         positive[w + width] = first_sign & ~second_sign;
@@ -134,13 +140,13 @@ class StateCode {
     }
   }
 
-  /// The integer inner product <x_SD(a), x_SD(b)>. Shapes: (l,).
+  /// The integer inner product <x_SD(a), x_SD(b)> of two samples' bins. Shapes: (l,).
   std::int32_t inner_product(std::span<const Bin> a, std::span<const Bin> b) const {
     return code_.inner_product(a, b);
   }
 
  private:
-  /// Number of pairs among the groups that one input modifies.
+  /// The number of pairs that the groups modified by one input form.
   std::size_t n_pairs() const noexcept { return n_partners() / 2; }
 
   std::vector<std::size_t> all_strides() const {
@@ -173,6 +179,8 @@ class StateCode {
     return ranks;
   }
 
+  /// Shares the tables; throws std::invalid_argument unless there are 2 to 1024 of one pattern
+  /// size.
   static SharedTables checked(std::vector<PatternTable> tables) {
     core::require_in_range("n_inputs", tables.size(), 2, 1024);
     SharedTables result;
@@ -186,8 +194,8 @@ class StateCode {
     return result;
   }
 
-  /// The code of all groups. First come those in pairs, which have the same modifier, and then
-  /// those without a partner: the order of the paired code.
+  /// Makes the code of all groups in the order of the paired code: first the groups in pairs,
+  /// sorted by modifier, then those without a partner.
   SelectiveDesensitization make_code() const {
     core::require(permutations_.size() == n_groups(), "number of permutations",
                   "n_inputs times the number of strides", permutations_.size());

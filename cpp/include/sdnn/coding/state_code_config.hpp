@@ -9,7 +9,8 @@
 
 namespace sdnn::coding {
 
-/// The fields that define the code, for any configuration with members of these names.
+/// Lists the fields that define the code, for any configuration with members of these names;
+/// `units` documents n_pattern_units, and `least_units` is its lower bound.
 template <class Config>
 constexpr auto state_code_fields(const char* units = "m, units per pattern (section 4.2: 200).",
                                  int least_units = 2) noexcept {
@@ -45,7 +46,8 @@ constexpr auto state_code_fields(const char* units = "m, units per pattern (sect
                   core::within(0, 1 << 24)));
 }
 
-/// The number of inputs that modify each input: an even share of max_pairs, at least one.
+/// Returns the number of inputs that modify each input: an even share of max_pairs but at least 1,
+/// or with max_pairs = 0 all other inputs.
 template <class Config>
 int n_partners_of(const Config& config) noexcept {
   if (config.n_inputs < 2) return 0;
@@ -54,8 +56,9 @@ int n_partners_of(const Config& config) noexcept {
              : config.n_inputs - 1;
 }
 
-/// The number of bins of all inputs by anchors and symbols; a double, because the fields may not be
-/// checked yet.
+/// Returns the number of bins of all inputs together: a bin for each symbol, and for each input
+/// that is a number those that the anchors make. The result is a double, because the fields may not
+/// be checked yet and their product may not fit into an integer.
 template <class Config>
 double n_bins_of(const Config& config) noexcept {
   double n_of_symbols = 0.0;
@@ -69,8 +72,8 @@ double n_bins_of(const Config& config) noexcept {
          n_numbers * (config.n_anchor_patterns - 1.0) * (config.n_interpolated + 1.0);
 }
 
-/// The bytes of the patterns of `n_bins` bins: the original ones, and permuted ones for each
-/// partner.
+/// Returns the bytes of the patterns of `n_bins` bins: the original patterns, and a permuted copy
+/// for each input that modifies them.
 template <class Config>
 double pattern_bytes_of(const Config& config, double n_bins) noexcept {
   return (n_partners_of(config) + 1.0) * n_bins * 8.0 * std::ceil(config.n_pattern_units / 64.0);

@@ -27,10 +27,11 @@ inline PatternTable symbol_patterns(int n_symbols, int n_units, bool balanced,
   return table;
 }
 
-/// Makes patterns with a unit for each of n_symbols, of which only that of the symbol is +1.
+/// Makes a pattern of n_symbols units for each symbol: unit k is +1 for symbol k, all others are
+/// -1.
 ///
-/// An input that is modified by itself then has a single non-neutral unit in each group, a
-/// different one for each symbol. The weights are then an exact table.
+/// If an input with these patterns is modified by itself, its only unit that is not neutral is the
+/// symbol's. A weight then belongs to a single symbol, and the weights are an exact table.
 inline PatternTable one_hot_patterns(std::size_t n_symbols) {
   PatternTable table(n_symbols, n_symbols);
   for (std::size_t symbol = 0; symbol < n_symbols; ++symbol) table.set(symbol, symbol);

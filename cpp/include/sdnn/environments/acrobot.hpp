@@ -14,16 +14,19 @@
 
 namespace sdnn::environments {
 
-/// The result of a decision: `terminated` at the goal, `truncated` after the last decision.
+/// The result of a decision: `terminated` at the goal, `truncated` after the episode's last
+/// decision without it.
 struct StepResult {
   double reward;
   bool terminated;
   bool truncated;
 };
 
-/// The reward and the end of the episode when decision number `decisions` has led to `state`.
+/// Returns the reward, and whether the episode ends, when decision number `decisions` (from 1) has
+/// led to `state`; `goal` is whether it has reached the goal.
 ///
-/// The goal overrides the penalty, which is tested at the decision instant only.
+/// The penalty is for idling or too much speed in `state`, and not on the way to it; at the goal
+/// there is none.
 inline StepResult result_of(const AcrobotConfig& config, const AcrobotState& state, bool goal,
                             int decisions) noexcept {
   const bool penalized = std::abs(state[0]) < config.idle_angle ||
@@ -49,11 +52,10 @@ class Acrobot {
   /// every number is finite.
   void set_state(const AcrobotState& state) { begin_at(wrapped(state)); }
 
-  /// Holds `torque` (N m) for one decision interval; `goal_tolerance`, the paper's lambda,
-  /// is the factor of the goal's speed limits. The goal overrides the penalty, tested at the
-  /// decision instant only. Throws std::invalid_argument unless |torque| <= max_torque and
-  /// goal_tolerance >= 0, std::logic_error if the episode is over, std::overflow_error if the
-  /// speeds outgrow the integration step.
+  /// Holds `torque` (N m) for one decision interval, or until the goal is reached.
+  /// `goal_tolerance`, the paper's lambda, is the factor of the goal's speed limits. Throws
+  /// std::invalid_argument unless |torque| <= max_torque and goal_tolerance >= 0, std::logic_error
+  /// if the episode is over, std::overflow_error if the speeds outgrow the integration step.
   StepResult step(double torque, double goal_tolerance) {
     check_step(torque, goal_tolerance);
     return end_step(integrate(torque, goal_tolerance));
@@ -84,7 +86,8 @@ class Acrobot {
   const AcrobotConfig& config() const noexcept { return dynamics_.config(); }
 
  private:
-  friend class AcrobotTeam;  // it integrates several at once
+  friend class AcrobotTeam;  // it integrates several acrobots at once, between check and end of a
+                             // step
 
   void check_step(double torque, double goal_tolerance) const {
     core::require_in_range("torque", torque, -config().max_torque, config().max_torque);
@@ -92,7 +95,7 @@ class Acrobot {
     if (over_) core::fail(std::logic_error("the episode is over: call reset before step"));
   }
 
-  // Ends a step, given whether its integration reached the goal.
+  // Ends a step after its integration; `goal` is whether that reached the goal.
   StepResult end_step(bool goal) {
     state_[0] = wrap_angle(state_[0]);
     state_[1] = wrap_angle(state_[1]);
@@ -106,8 +109,8 @@ class Acrobot {
     return result;
   }
 
-  // Advances the state by one decision interval, or less if it reaches the goal, where the joints
-  // may turn no faster than the limits. Returns whether it reached the goal.
+  // Advances the state by one decision interval, or less if it reaches the goal: the tip is high
+  // enough and the joints turn no faster than the limits. Returns whether it reached the goal.
   bool integrate(double torque, double goal_tolerance) noexcept {
     const double limit_1 = config().goal_velocity_1 * goal_tolerance;
     const double limit_2 = config().goal_velocity_2 * goal_tolerance;

@@ -1,4 +1,4 @@
-/// Batches of acrobots, which move several at a time in the lanes of vector registers.
+/// Batches of acrobots, several of which move at a time in a vector register.
 #pragma once
 
 #include <Eigen/Core>
@@ -31,13 +31,12 @@ inline constexpr std::size_t kMaxAcrobots = std::size_t{1} << 24;
 /// Results of a step for every acrobot of a batch: StepResult's members. Shapes: all (size(),).
 struct AcrobotBatchResults {
   std::span<double> rewards;
-  std::span<std::uint8_t> terminated;  ///< 1: the goal
-  std::span<std::uint8_t> truncated;   ///< 1: the last decision was made
+  std::span<std::uint8_t> terminated;  ///< 1 at the goal, else 0
+  std::span<std::uint8_t> truncated;   ///< 1 after the last decision without the goal, else 0
 };
 
-/// A batch of N acrobots that move together, each with the bits of an Acrobot.
-///
-/// Each acrobot has a separate torque, goal tolerance and end of episode. A step allocates nothing.
+/// A batch of acrobots that move together; each gives the same bits as an Acrobot. Each has a
+/// separate torque, goal tolerance and end of episode. A step allocates nothing.
 class AcrobotBatch {
  public:
   /// Starts all at rest, hanging down. Throws std::invalid_argument if a number is outside its
@@ -94,7 +93,7 @@ class AcrobotBatch {
     }
     move_all(moving);
     std::size_t n_overflows = 0, first_overflow = 0;
-    for (std::size_t i = size_; i-- > 0;) {
+    for (std::size_t i = size_; i-- > 0;) {  // backwards, so that the first overflow is kept
       StepResult result{0.0, false, false};
       if (moving[i]) {
         state_[0][i] = wrap_angle(state_[0][i]);
@@ -170,14 +169,16 @@ class AcrobotBatch {
     core::require(false, name, "of " + std::to_string(expected) + " items", size);
   }
 
-  /// Moves the batch in short parts. An interruption between them ends the episodes of all moving
-  /// acrobots.
+  /// Integrates one decision of the moving acrobots, some of them at a time. An interruption
+  /// between these parts ends the episodes of all moving acrobots, because only some of them have
+  /// moved.
   void move_all(std::span<const std::uint8_t> moving) {
     constexpr double kStepsPerPoint = 1 << 20;  // these take a fraction of a second
     const double steps = std::nearbyint(config().decision_interval / config().integration_step);
     const std::size_t n_at_once =
         core::round_up(static_cast<std::size_t>(kStepsPerPoint / steps) + 1, kAcrobotLanes);
-    for (std::size_t i = 0; i < size_; ++i) over_[i] = over_[i] || moving[i];  // step undoes it
+    // All moving episodes count as over until `step` has decided, in case of an interruption.
+    for (std::size_t i = 0; i < size_; ++i) over_[i] = over_[i] || moving[i];
     for (std::size_t first = 0; first < padded_size_; first += n_at_once) {
       core::interruption_point();
       move_acrobots(dynamics_,
@@ -213,8 +214,8 @@ class AcrobotBatch {
     over_[i] = false;
   }
 
-  /// Checks the arguments of a step before any acrobot moves. Torques of resting acrobots may be
-  /// anything.
+  /// Checks the arguments of a step before any acrobot moves. Torques and tolerances of acrobots
+  /// that do not move may have any value.
   void check_step(std::span<const double> torques, std::span<const double> goal_tolerances,
                   std::span<const std::uint8_t> moving, const AcrobotBatchResults& results) const {
     require_size("torques", torques.size());
@@ -242,7 +243,7 @@ class AcrobotBatch {
   std::array<core::AlignedBuffer<double>, 4> state_;  // theta1, theta2, theta1_dot, theta2_dot
   core::AlignedBuffer<double> torque_;
   core::AlignedBuffer<double> goal_tolerance_;
-  core::AlignedBuffer<std::uint64_t> mask_;
+  core::AlignedBuffer<std::uint64_t> mask_;  // see AcrobotArrays
   std::vector<int> decisions_;
   std::vector<char> over_;
 };

@@ -1,4 +1,4 @@
-/// The numbers of the acrobot's swing-up task.
+/// The configuration of the acrobot's swing-up task.
 #pragma once
 
 #include <array>
@@ -19,7 +19,8 @@ constexpr std::array<std::string_view, 2> words_of(GoalTest) noexcept {
   return {"every_step", "decision_instant"};
 }
 
-/// The task's numbers; the defaults are the paper's.
+/// The configuration of the acrobot, its task and the integration; the defaults are the paper's
+/// where the paper states them. Units: see fields().
 struct AcrobotConfig {
   double link_mass_1 = 1.0;
   double link_mass_2 = 1.0;

@@ -22,26 +22,27 @@
 
 namespace sdnn::environments {
 
-/// Treatment of noise at the ends of a sensor's range [0, 1].
+/// Treatment of a noisy value outside a sensor's range [0, 1].
 enum class SensorEdge {
-  wrap,      ///< an angle: 1 continues at 0, the result is in [0, 1)
-  saturate,  ///< the result stays at the end
+  wrap,      ///< for an angle: 1 is the same as 0, so the value is wrapped into [0, 1)
+  saturate,  ///< the value is clipped
 };
 constexpr std::array<std::string_view, 2> words_of(SensorEdge) noexcept {
   return {"wrap", "saturate"};
 }
 
-/// The fractional part of a number of turns, in [0, 1).
+/// Returns the fractional part of a number of turns, in [0, 1).
 inline double wrap_to_unit(double x) noexcept {
   const double wrapped = x - std::floor(x);
   return wrapped < 1.0 ? wrapped : 0.0;  // a tiny negative x rounds to 1
 }
 
-/// The nearest number in [0, 1].
+/// Returns the nearest number in [0, 1].
 inline double saturate_to_unit(double x) noexcept { return std::clamp(x, 0.0, 1.0); }
 
-/// The four basic observations s1..s4 of a state: angles as turns in [0, 1), speeds so that
-/// -3 pi .. 3 pi and -5 pi .. 5 pi fill [0, 1].
+/// Returns the four basic observations s1..s4 of a state: the angles theta1 and theta2 as turns in
+/// [0, 1), 1/2 for an angle of 0, and the angular velocities, such that -3 pi .. 3 pi and -5 pi ..
+/// 5 pi rad/s become [0, 1]; others are clipped.
 inline Eigen::Vector4d basic_observation(const AcrobotState& state) noexcept {
   constexpr double kSpeedRange1 = 6.0 * core::kPi, kSpeedRange2 = 10.0 * core::kPi;
   return {wrap_to_unit(state[0] / core::kTwoPi + 0.5), wrap_to_unit(state[1] / core::kTwoPi + 0.5),
@@ -49,12 +50,13 @@ inline Eigen::Vector4d basic_observation(const AcrobotState& state) noexcept {
           saturate_to_unit(state[3] / kSpeedRange2 + 0.5)};
 }
 
-/// s5, like a kinetic energy: 2 ((s3 - 1/2)^2 + (s4 - 1/2)^2), in [0, 1].
+/// Returns s5, a measure like a kinetic energy: 2 ((s3 - 1/2)^2 + (s4 - 1/2)^2), in [0, 1].
 inline double energy_sensor(double s3, double s4) noexcept {
   return 2.0 * ((s3 - 0.5) * (s3 - 0.5) + (s4 - 0.5) * (s4 - 0.5));
 }
 
-/// s6, the height of the tip: (2 + cos 2 pi s1 - cos 2 pi (s1 + s2)) / 4, in [0, 1].
+/// Returns s6, the height of the tip of equal links: (2 + cos 2 pi s1 - cos 2 pi (s1 + s2)) / 4, in
+/// [0, 1]. The signs differ because s1 and s2 are both shifted by half a turn.
 inline double height_sensor(double s1, double s2) noexcept {
   return (2.0 + core::sin_cos(core::kTwoPi * s1).cos -
           core::sin_cos(core::kTwoPi * (s1 + s2)).cos) /
@@ -90,16 +92,16 @@ class SensorNoise {
   core::Random random_;
 };
 
-/// Variables to which noise is added (an assumption).
+/// Variables to which noise is added; the paper does not say.
 enum class NoiseEntry {
-  every_sensor,   ///< s5 and s6 are computed from the true s1..s4 and have separate noise
-  basic_sensors,  ///< on s1..s4 alone; s5 and s6 are computed from noisy values
+  every_sensor,   ///< all: s5 and s6 are computed from the true s1..s4 and have separate noise
+  basic_sensors,  ///< s1..s4 alone: s5 and s6 are computed from the noisy values
 };
 constexpr std::array<std::string_view, 2> words_of(NoiseEntry) noexcept {
   return {"every_sensor", "basic_sensors"};
 }
 
-/// Observed variables (section 4.3).
+/// The variables of an observation and their noise (section 4.3).
 struct SensorConfig {
   int n_sensors = 4;
   double noise = 0.0;
@@ -107,7 +109,7 @@ struct SensorConfig {
   int n_constant = 0;
   int n_random = 0;
 
-  /// Numbers in an observation.
+  /// The number of variables in an observation.
   int n_inputs() const noexcept { return n_sensors + n_constant + n_random; }
 
   static constexpr auto fields() noexcept {
@@ -134,13 +136,15 @@ struct SensorConfig {
   bool operator==(const SensorConfig&) const = default;
 };
 
-/// Sensors of s1..s4 and, if configured, s5 and s6, with noise, and useless inputs.
+/// Sensors that observe, in this order, s1..s4, s5 and s6 if configured, constant inputs of 1/2,
+/// and random inputs.
 ///
-/// Source: the paper's sections on the acrobot task and on noisy and redundant inputs; useless
-/// inputs are not in the paper. These come last: constant inputs, then random inputs.
+/// Source: the paper's sections on the acrobot task and on noisy and redundant inputs. The useless
+/// inputs, constant and random, are not in the paper.
 class AcrobotSensors {
  public:
-  /// Throws std::invalid_argument if a number is outside its range.
+  /// Makes sensors whose noise has the random stream `stream` of the seed. Throws
+  /// std::invalid_argument if a number is outside its range.
   AcrobotSensors(const SensorConfig& config, std::uint64_t seed, core::Stream stream)
       : n_sensors_(checked("n_sensors", config.n_sensors, kBasic, kBasic + 2)),
         n_constant_(checked("n_constant", config.n_constant, 0, kMaxUseless)),
@@ -149,7 +153,7 @@ class AcrobotSensors {
         noise_(config.noise, edges(config), seed, stream),
         random_(seed, core::Stream::useless_inputs, static_cast<std::uint64_t>(stream)) {}
 
-  /// Writes an observation of `state`. Shapes: out (n_inputs,), every entry in [0, 1].
+  /// Writes an observation of `state`. Shape: out (n_inputs,); every entry is in [0, 1].
   void observe(const AcrobotState& state, std::span<double> out) noexcept {
     assert(out.size() == n_inputs());
     const Eigen::Vector4d basic = basic_observation(state);
@@ -163,7 +167,7 @@ class AcrobotSensors {
     for (double& value : out.last(n_random_)) value = random_.uniform();
   }
 
-  /// Numbers in an observation.
+  /// The number of variables in an observation.
   std::size_t n_inputs() const noexcept { return n_sensors_ + n_constant_ + n_random_; }
 
  private:

@@ -9,12 +9,11 @@
 
 namespace sdnn::environments {
 
-/// theta1, theta2 (rad), theta1_dot, theta2_dot (rad/s).
-///
-/// theta1 = 0 hangs down, theta2 is relative to link 1.
+/// The state (theta1, theta2, theta1_dot, theta2_dot), in rad and rad/s. theta1 = 0 hangs down;
+/// theta2 is relative to link 1.
 using AcrobotState = Eigen::Vector4d;
 
-/// The angle plus the whole number of turns that brings it into [-pi, pi).
+/// Returns the angle plus the whole number of turns that brings it into [-pi, pi).
 ///
 /// std::remainder is exact by IEEE 754, hence equal on all platforms; an angle within the interval
 /// is returned unchanged.

@@ -1,4 +1,4 @@
-/// Several Acrobot objects that move side by side in the lanes of vector registers.
+/// Several Acrobot objects that move at once in vector registers.
 #pragma once
 
 #include <array>
@@ -11,13 +11,14 @@
 
 namespace sdnn::environments {
 
-/// Up to kMaxMembers acrobots of equal configs. A step of all takes little longer than that of a
-/// single one, with the bits of Acrobot::step.
+/// Up to kMaxMembers acrobots of equal configurations, which step together. That takes little
+/// longer than a step of a single acrobot, and gives the same bits as Acrobot::step.
 class AcrobotTeam {
  public:
   static constexpr std::size_t kMaxMembers = kAcrobotLanes;
 
-  /// Adds `acrobot` to the next step as number `i`, below kMaxMembers; it must exist until then.
+  /// Adds `acrobot` to the next step, and to that alone, as member `i`, below kMaxMembers; it must
+  /// exist until then.
   /// Throws std::invalid_argument or std::logic_error if Acrobot::step would.
   void join(std::size_t i, Acrobot& acrobot, double torque, double goal_tolerance) {
     acrobot.check_step(torque, goal_tolerance);
@@ -26,12 +27,12 @@ class AcrobotTeam {
     goal_tolerance_[i] = goal_tolerance;
   }
 
-  /// Calls Acrobot::step for all that joined since the last step, and take(i, result) for each.
-  /// Returns whether there were any. Throws std::overflow_error like Acrobot::step; then later
-  /// members have no result.
+  /// Does what Acrobot::step does for all that have joined since the last step, and calls take(i,
+  /// result) for each. Returns whether there were any. Throws std::overflow_error like
+  /// Acrobot::step; then the members after the failed one get no result.
   template <class Take>
   bool step(Take&& take) {
-    const Acrobot* any = nullptr;
+    const Acrobot* any = nullptr;  // some member: all have the same dynamics
     for (std::size_t i = 0; i < kMaxMembers; ++i) {
       mask_[i] = members_[i] != nullptr ? ~std::uint64_t{0} : 0;
       if (members_[i] == nullptr) continue;
@@ -63,7 +64,7 @@ class AcrobotTeam {
   alignas(64) std::array<Numbers, 4> state_ = {};  // theta1, theta2, theta1_dot, theta2_dot
   alignas(64) Numbers torque_ = {};
   alignas(64) Numbers goal_tolerance_ = {};
-  alignas(64) std::array<std::uint64_t, kMaxMembers> mask_ = {};
+  alignas(64) std::array<std::uint64_t, kMaxMembers> mask_ = {};  // see AcrobotArrays
 };
 
 }  // namespace sdnn::environments

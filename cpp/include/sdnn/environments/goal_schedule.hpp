@@ -14,15 +14,15 @@ namespace sdnn::environments {
 
 /// The formula of lambda(k); the paper's is garbled in print.
 enum class GoalScheduleKind {
-  inverse_linear,  ///< 1 / (1 + k / scale): the default assumption
-  inverse_sqrt,    ///< 1 / sqrt(1 + k): continuous at k = 10000
+  inverse_linear,  ///< 1 / (1 + k / scale): the default, an assumption
+  inverse_sqrt,    ///< 1 / sqrt(1 + k): at k = 10000 about 0.01, the constant of later episodes
   constant,        ///< `constant_value` for every k
 };
 constexpr std::array<std::string_view, 3> words_of(GoalScheduleKind) noexcept {
   return {"inverse_linear", "inverse_sqrt", "constant"};
 }
 
-/// Schedule of the goal tolerance lambda(k) over learning episodes k (section 4.1).
+/// The schedule of the goal tolerance lambda(k) over learning episodes k (section 4.1).
 struct GoalScheduleConfig {
   GoalScheduleKind kind = GoalScheduleKind::inverse_linear;
   double scale = 100.0;
@@ -48,10 +48,10 @@ struct GoalScheduleConfig {
   bool operator==(const GoalScheduleConfig&) const = default;
 };
 
-/// The goal tolerance lambda as a function of the number of the learning episode.
+/// The goal tolerance lambda as a function of the number of the learning episode: the goal requires
+/// |theta1_dot| < 3 pi lambda and |theta2_dot| < 5 pi lambda.
 ///
-/// Source: the paper's section on the acrobot task, goal condition |theta1_dot| < 3 pi lambda and
-/// |theta2_dot| < 5 pi lambda.
+/// Source: the paper's section on the acrobot task.
 class GoalSchedule {
  public:
   /// Throws std::invalid_argument if a number is outside its range.
@@ -59,7 +59,8 @@ class GoalSchedule {
     core::check_fields(config);
   }
 
-  /// lambda of the 1-based learning episode `episode`. Throws std::invalid_argument below 1.
+  /// Returns lambda in the learning episode with this number, from 1. Throws std::invalid_argument
+  /// below 1.
   double operator()(int episode) const {
     core::require(episode >= 1, "episode", "at least 1", episode);
     if (config_.kind == GoalScheduleKind::constant) return config_.constant_value;

@@ -32,13 +32,16 @@ struct Correction {
 /// The p-delta rule, which moves the number of firing units of each group to its target.
 ///
 /// If n units too few (too many) fire, the n silent (firing) units nearest to their threshold are
-/// corrected, the lowest index first; with a `share` below 1 only max(1, int(0.5 + share * n)). The
-/// target is int(0.5 + target), at least 0 and at most the group's size.
+/// corrected, of equally near units those with the lowest index; with a `share` below 1 only max(1,
+/// int(0.5 + share * n)) units. A target is rounded to int(0.5 + target) and clipped to 0 and the
+/// group's size.
 ///
 /// Source: Auer, Burgsteiner, Maass 2008; Nonaka, Tanaka, Morita 2011.
 class PDeltaRule {
  public:
-  /// Targets in units of the firing count, not rounded: (t - b) / a.
+  /// Takes the target numbers of firing units, not rounded: (t - b) / a for an output t = a *
+  /// number
+  /// + b.
   ///
   /// Shapes: targets (n_samples, n_groups). Throws std::invalid_argument if a target is not finite,
   /// if n_units is 0, if n_groups does not divide it, or if share is not in (0, 1].
@@ -93,7 +96,9 @@ class PDeltaRule {
     const auto add = [&](std::size_t i) {
       corrections.push_back({static_cast<std::uint32_t>(first_unit + i), direction});
     };
-    if (n_corrected <= kScans) {  // searches for the least key, then for the next one, and so on
+    // Few units are found by a scan for the least key of rank_units, then for the next larger one,
+    // and so on. A key ends with the unit's index, in n_index_bits_ bits.
+    if (n_corrected <= kScans) {
       const std::size_t n_before = corrections.size();
       std::int32_t key = rank_units(potentials, group_size_, deficit < 0, n_index_bits_,
                                     distance_limit_, keys_.data());
@@ -102,7 +107,7 @@ class PDeltaRule {
         if (--left == 0) return;
         key = least_above(keys_.data(), group_size_, key);
       }
-      corrections.resize(n_before);  // keys do not distinguish larger distances
+      corrections.resize(n_before);  // keys do not distinguish distances of the limit and above
     }
     ranked_.clear();
     for (std::size_t i = 0; i < group_size_; ++i) {
@@ -115,7 +120,7 @@ class PDeltaRule {
     std::for_each(ranked_.begin(), end, [&](const auto& ranked) { add(ranked.second); });
   }
 
-  /// The number of corrections up to which scans of the keys are faster than nth_element.
+  /// The number of corrections up to which repeated scans are taken to be faster than nth_element.
   static constexpr std::size_t kScans = 12;
 
   std::size_t n_groups_;
@@ -124,11 +129,12 @@ class PDeltaRule {
   std::vector<std::int32_t> targets_;
   std::vector<std::int32_t> keys_;
   int n_index_bits_ = 0;
-  std::int32_t distance_limit_ = 0;  // the largest distance that keys distinguish
+  std::int32_t distance_limit_ = 0;  // keys distinguish smaller distances only
   std::vector<std::pair<std::int32_t, std::uint32_t>> ranked_;
 };
 
-/// The scheme that separates several classes by units that separate two sides.
+/// How several classes are separated by units, each of which separates only two sides: the classes
+/// for which it should fire, and those for which it should not.
 enum class ClassScheme {
   one_vs_rest,  ///< unit k fires for class k
   one_vs_one,   ///< units (0,1), (0,2), ..., (1,2), ...: fires for the first, silent for the second
@@ -149,16 +155,17 @@ inline ClassScheme class_scheme_named(std::string_view name) {
       std::invalid_argument("scheme must be one_vs_rest or one_vs_one, got " + std::string(name)));
 }
 
-/// The number of units of a scheme. Throws std::invalid_argument if there are fewer than 2 classes
-/// or more than 1024.
+/// Returns the number of units that a scheme needs. Throws std::invalid_argument if there are fewer
+/// than 2 classes or more than 1024.
 inline std::size_t n_units_for(ClassScheme scheme, std::size_t n_classes) {
   core::require_in_range("n_classes", n_classes, 2, 1024);
   return scheme == ClassScheme::one_vs_rest ? n_classes : n_classes * (n_classes - 1) / 2;
 }
 
-/// The perceptron rule: it corrects every unit on the wrong side for the sample's class.
+/// The perceptron rule: it corrects every unit that fires but should not for the sample's class, or
+/// the reverse. A one-vs-one unit is not corrected for classes other than its two.
 ///
-/// Source: the LIBSDNN manual (both schemes). A one-vs-one unit ignores the other classes.
+/// Source: the LIBSDNN manual (both schemes).
 class PerceptronRule {
  public:
   /// Takes the class of each sample. Shapes: labels (n_samples,) in [0, n_classes). Throws
@@ -206,7 +213,8 @@ class PerceptronRule {
  private:
   std::size_t n_units_;
   std::vector<std::int32_t> labels_;
-  std::vector<std::vector<Correction>> wanted_;  // required corrections of the units, by class
+  /// For each class, the units that separate it; direction: +1 if the unit should fire, else -1.
+  std::vector<std::vector<Correction>> wanted_;
 };
 
 }  // namespace sdnn::estimators

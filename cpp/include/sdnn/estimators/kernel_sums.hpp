@@ -1,4 +1,4 @@
-/// The kernel that products of long codes approach, for samples and queries, and sums over it.
+/// The kernel of samples, to which inner products of codes converge as the codes become longer.
 #pragma once
 
 #include <algorithm>
@@ -20,36 +20,40 @@
 
 namespace sdnn::estimators {
 
-/// The correlations of an input's patterns: of two bins a table (n_bins, n_bins), or, where they
-/// fall by a constant factor from bin to bin, those with the first bin (n_bins,). In the latter, 0
-/// stands for a bin that correlates with no other, nor with itself.
+/// The correlations of the patterns of an input's bins, in one of two forms. A table, shape
+/// (n_bins, n_bins), has those of any two bins. If correlations fall by a constant factor from bin
+/// to bin, those with the first bin, shape (n_bins,), are enough; there a 0 marks a bin that
+/// correlates with no other, nor with itself.
 struct InputCorrelations {
   std::vector<double> values;
   std::size_t n_bins = 0;
 
+  /// Whether only the correlations with the first bin are stored.
   bool is_geometric() const noexcept { return values.size() == n_bins; }
 };
 
-/// The number of samples whose correlations are next to each other.
+/// The number of samples in a group, whose numbers of one kind are adjacent in memory.
 inline constexpr std::size_t kGroupSamples = 16;
 
-/// Samples in groups. Powers: (n_groups, n_geometric, 2, kGroupSamples), a correlation with the
-/// first bin and its inverse. Bins of the other inputs: (n_groups, n_tables, kGroupSamples).
+/// Samples in groups of kGroupSamples. For a geometric input a sample has its correlation with the
+/// first bin, a power of the input's factor, and the inverse; for an input with a table, its bin.
 struct SampleGroups {
-  const double* powers;
-  const std::int32_t* bins;
+  const double* powers;      ///< (n_groups, n_geometric, 2, kGroupSamples)
+  const std::int32_t* bins;  ///< (n_groups, n_tables, kGroupSamples)
   std::size_t n_geometric;
   std::size_t n_tables;
 };
 
-/// A query: its powers (n_geometric, 2), and for the other inputs the rows of tables.
+/// A query: for geometric inputs its powers and their inverses as in SampleGroups, and for other
+/// inputs the rows of their tables that belong to its bins.
 struct KernelQuery {
-  const double* powers;
-  const double* const* rows;
+  const double* powers;       ///< (n_geometric, 2)
+  const double* const* rows;  ///< (n_tables,)
 };
 
-/// The kernel is linear * t + quadratic * (t^2 - s), with t and s the sums of correlations and of
-/// their squares, and then a polynomial of it by the degree.
+/// The constants of the kernel: k = linear * t + quadratic * (t^2 - s), where t is the sum of the
+/// inputs' correlations and s that of their squares, and then k, (k + k^2) / 2 or k^3 for the
+/// degree 1, 2 or 3.
 struct KernelForm {
   double linear;
   double quadratic;
@@ -68,13 +72,14 @@ SDNN_INLINE Real loaded(const double* from) noexcept {
   }
 }
 
+/// Writes a register of numbers, or a single one.
 SDNN_INLINE void stored(double value, double* to) noexcept { *to = value; }
 template <class Real>
 SDNN_INLINE void stored(const Real& value, double* to) noexcept {
   value.store(to);
 }
 
-/// Computes the kernel of a query and groups of samples, several samples in each register.
+/// Implements kernel_values, below, with several samples in each register.
 template <class Real>
 SDNN_INLINE void kernel_values_in_lanes(const SampleGroups& groups, std::size_t begin,
                                         std::size_t end, const KernelQuery& query,
@@ -92,7 +97,8 @@ SDNN_INLINE void kernel_values_in_lanes(const SampleGroups& groups, std::size_t 
       core::unrolled<kRegisters>([&](std::size_t r) SDNN_INLINE_LAMBDA {
         const Real sample_power = loaded<Real>(power + r * kSize);
         const Real sample_inverse = loaded<Real>(power + kGroupSamples + r * kSize);
-        // The smaller of the two ratios is factor^|distance of the bins|.
+        // Bins i and j have powers f^i and f^j, f <= 1; their correlation is f^|i - j|, the smaller
+        // one of f^i / f^j and f^j / f^i.
         const Real rho = core::smaller(query_power * sample_inverse, query_inverse * sample_power);
         total[r] = total[r] + rho;
         squares[r] = squares[r] + rho * rho;
@@ -117,7 +123,7 @@ SDNN_INLINE void kernel_values_in_lanes(const SampleGroups& groups, std::size_t 
   }
 }
 
-/// The sum of products, as 16 partial sums on every machine, so that the bits are the same.
+/// Implements product, below, with 16 partial sums on every machine, so that the bits are the same.
 template <class Real>
 SDNN_INLINE double product_in_lanes(const double* a, const double* b, std::size_t size) noexcept {
   constexpr std::size_t kSize = sizeof(Real) / sizeof(double);
@@ -166,27 +172,29 @@ SDNN_KERNEL_OF_REALS(void, kernel_values,
                       const KernelQuery& query, const KernelForm& form, double* out),
                      (groups, begin, end, query, form, out))
 
-/// The sum of products of numbers, a multiple of kGroupSamples, in the same order everywhere.
+/// Computes the sum of a[i] * b[i] for i < size, a multiple of kGroupSamples, in the same order on
+/// every machine.
 SDNN_KERNEL_OF_REALS(double, product, (const double* a, const double* b, std::size_t size),
                      (a, b, size))
 
 #undef SDNN_KERNEL_OF_REALS
 #undef SDNN_KERNELS_OF_WIDE_REALS
 
-/// The kernel of all pairs of inputs between fixed samples and any queries.
+/// The kernel, of the code of all pairs of inputs, between fixed samples and any queries.
 ///
-/// With correlations rho of two samples' patterns it is the mean of (1 + rho_i) / 2 * rho_j over
-/// all i != j, or rho of a single input; then k, (k + k^2) / 2 or k^3 by the degree 1, 2, 3. All
-/// sums have a fixed order, so that results have the same bits on every instruction set.
+/// Let rho_i be the correlation of the patterns of input i in two samples. Then k is the mean of (1
+/// + rho_i) / 2 * rho_j over all i != j, or rho of a single input; the kernel is k, (k + k^2) / 2
+/// or k^3 for the degree 1, 2 or 3. All sums have a fixed order, so that results have the same bits
+/// on every instruction set.
 ///
-/// Correlations that fall by a factor from bin to bin are ratios of two powers, the smaller of the
-/// two; others are read from tables. Cost: some six operations for each sample and input, in lanes.
-/// Thread safety: calls may run at the same time.
+/// Cost: some six operations for each sample and input, several samples at a time in vector
+/// registers. Thread safety: calls may run at the same time.
 class KernelSums {
  public:
-  /// `n_terms` is the number of inputs in the mean, below that of `inputs` if the correlations of
-  /// some are sums over two of them. Shapes: bins (n_samples, n_inputs). Throws
-  /// std::invalid_argument for impossible arguments.
+  /// Takes the correlations of all inputs, and the samples. `n_terms` is the number of inputs in
+  /// the mean. It is below the number of `inputs` if the correlations of some are given as sums of
+  /// two entries. Shapes: bins (n_samples, n_inputs). Throws std::invalid_argument for impossible
+  /// arguments.
   KernelSums(std::vector<InputCorrelations> inputs, std::span<const std::int32_t> bins,
              std::size_t n_terms, int degree)
       : inputs_(std::move(inputs)) {
@@ -273,7 +281,8 @@ class KernelSums {
                   "correlations of one bin of 0, or at least 1e-150", "others");
   }
 
-  /// Correlations of 0 with the first bin are 0 with all.
+  /// Returns the inverse of a power, or 0 for 0, so that a bin marked by 0 correlates with no
+  /// other.
   static double inverse(double power) noexcept { return power == 0.0 ? 0.0 : 1.0 / power; }
 
   void check_bins(std::span<const std::int32_t> bins) const {
@@ -289,7 +298,9 @@ class KernelSums {
     return inputs_[input].values[static_cast<std::size_t>(bins[input])];
   }
 
-  /// Calls consume(query, kernel) for each query, with the kernel of all samples and of padding.
+  /// Calls consume(query, kernel) for each query; kernel has the values for all samples, and behind
+  /// them those of padding. A few queries at a time visit each part of the samples, so that it is
+  /// read from the cache.
   template <class Consume>
   void for_each_query(std::span<const std::int32_t> bins, const Consume& consume) const {
     check_bins(bins);

@@ -17,11 +17,12 @@
 
 namespace sdnn::estimators {
 
-/// Kernel ridge regression whose inverse matrix slides with a window of samples.
+/// Kernel ridge regression on a sliding window of samples; the inverse of the kernel matrix is
+/// updated with each sample.
 ///
-/// The kernel is e to the minus sum of distances of inputs, divided by length_scale and the root of
-/// their number. Distances are in widths of the first range of an input. A missing input, NaN,
-/// counts as the middle of the range. Targets may be limited to a multiple of their mean size.
+/// The kernel of two samples is exp(-d / (length_scale * sqrt(n_inputs))), where d is the sum over
+/// the inputs of |difference|, in widths of the input's first range. A missing input, NaN, counts
+/// as the middle of the range. Targets may be limited to a multiple of their mean size.
 ///
 /// All sums have a fixed order, so that results have the same bits on every machine.
 ///
@@ -153,9 +154,12 @@ class KernelWindow {
 
  private:
   static constexpr std::size_t kMostSamples = 4096;
-  static constexpr std::size_t kMostReplaced = 2000;  ///< before rounding errors are removed
-  static constexpr double kFarthest = 1e6;            ///< widths from the middle
+  /// The number of replaced samples after which the inverse is computed anew, against rounding
+  /// errors; chosen.
+  static constexpr std::size_t kMostReplaced = 2000;
+  static constexpr double kFarthest = 1e6;  ///< limit of scaled inputs, in widths from the middle
 
+  /// Writes inputs as distances from the middles of their ranges, in widths; see detail::scaled.
   void scale(std::span<const double> inputs, std::span<double> scaled) const noexcept {
     for (std::size_t i = 0; i < inputs.size(); ++i) {
       const double distance = detail::scaled(inputs[i], middle_[i], half_width_[i]);
@@ -177,7 +181,7 @@ class KernelWindow {
     for (double& value : out) value = core::exp(value);
   }
 
-  /// Writes the product of the inverse matrix and the kernels.
+  /// Writes the product of the inverse matrix and a vector of kernels, the coefficients of samples.
   void solve(std::span<const double> kernel, std::span<double> out) const noexcept {
     std::ranges::fill(out, 0.0);
     for (std::size_t row = 0; row < kernel.size(); ++row) {
@@ -187,14 +191,16 @@ class KernelWindow {
     }
   }
 
-  /// Puts inputs into a slot, the oldest sample's or the first empty one; returns false if rounding
-  /// errors made the inverse useless.
+  /// Puts inputs into a slot, that of the oldest sample (`replaces`) or the first empty one, and
+  /// updates the inverse. Returns false if rounding errors made the inverse useless.
   bool add(std::size_t slot, std::span<const double> scaled, bool replaces) {
     std::vector<double> kernel(n_samples_), gains(n_samples_), removed(n_samples_);
     kernels(scaled, kernel);
     solve(kernel, gains);
     double factor_removed = 0.0;
-    if (replaces) {  // the inverse without a row and column, by its Schur complement
+    // The inverse A without the sample in `slot` is A - r r^T / r[slot], where r is row `slot` of
+    // A. Its row and column `slot` become 0, and so must the kernel and gains.
+    if (replaces) {
       const double* const inverses = inverse_.data() + slot * capacity_;
       std::copy_n(inverses, n_samples_, removed.begin());
       factor_removed = 1.0 / removed[slot];
@@ -203,8 +209,9 @@ class KernelWindow {
       gains[slot] = 0.0;
       kernel[slot] = 0.0;
     }
-    // A row and column are added by the inverse of a block matrix. `variance` is the new diagonal
-    // minus its part that the other samples explain; it is in [ridge, 1 + ridge] but for rounding.
+    // The new sample adds a row and a column, by the formula for the inverse of a block matrix.
+    // `variance` is the kernel of the sample with itself, 1, plus the ridge, minus the part that
+    // the other samples explain; without rounding errors it is in [ridge, 1 + ridge].
     double variance = 1.0 + ridge_;
     for (std::size_t i = 0; i < n_samples_; ++i) variance -= kernel[i] * gains[i];
     std::ranges::copy(scaled, inputs_.begin() + static_cast<std::ptrdiff_t>(slot * n_inputs()));

@@ -35,21 +35,23 @@ inline StandardLibrary standard_library_named(std::string_view name) {
   return StandardLibrary::msvc;
 }
 
-/// LIBSDNN's generator: std::mt19937 from a std::seed_seq, both fully specified by the standard,
-/// and the uniform integers of one standard library, which are not.
+/// LIBSDNN's random numbers: std::mt19937, seeded by a std::seed_seq, which the C++ standard
+/// specifies fully, and uniform integers as one standard library draws them, which it does not
+/// specify.
 class LibsdnnRandom {
  public:
-  /// Throws std::invalid_argument if there is no seed.
+  /// Seeds the generator. Throws std::invalid_argument if `seed` is empty.
   LibsdnnRandom(std::span<const std::uint32_t> seed, StandardLibrary library) : library_(library) {
     core::require(!seed.empty(), "seed", "at least one number", seed.size());
     std::seed_seq sequence(seed.begin(), seed.end());
     generator_.seed(sequence);
   }
 
-  /// An integer in [low, high].
+  /// Draws an integer in [low, high], one of n = high - low + 1.
   ///
-  /// Source: Lemire 2019 (libstdc++: the high half of a product, its low half rejected below
-  /// 2^32 mod n); the remainder of 32 bits, rejected in the last incomplete cycle (msvc).
+  /// libstdc++ multiplies 32 random bits by n and takes the high half of the product; a product
+  /// whose low half is below 2^32 mod n is rejected (Lemire 2019). msvc takes the remainder of 32
+  /// random bits divided by n; bits above the last whole multiple of n are rejected.
   std::int32_t uniform(std::int32_t low, std::int32_t high) {
     const auto n = static_cast<std::uint32_t>(high - low) + 1;
     const std::uint32_t incomplete = (0U - n) % n;  // 2^32 mod n
@@ -72,8 +74,9 @@ class LibsdnnRandom {
 
 namespace detail {
 
-/// LIBSDNN packs 32 units into a word, first unit highest, and reads words from the lowest bit: in
-/// every 32 units (and in the rest at the end) the order of columns is reversed.
+/// Returns the column of a unit. LIBSDNN packs 32 units into a word, the first unit in the highest
+/// bit, and reads words from the lowest bit. So the order is reversed within every 32 units, and
+/// within the rest at the end.
 inline std::size_t libsdnn_column(std::size_t unit, std::size_t n_units) noexcept {
   const std::size_t begin = unit / 32 * 32;
   const std::size_t end = begin + 32 < n_units ? begin + 32 : n_units;
@@ -82,8 +85,9 @@ inline std::size_t libsdnn_column(std::size_t unit, std::size_t n_units) noexcep
 
 }  // namespace detail
 
-/// A random-inverse code as drawn by LIBSDNN: units are drawn until one has the required sign and
-/// has not been flipped in this step; signs alternate, +1 first.
+/// Draws a random-inverse code as LIBSDNN does. For each unit to flip, units are drawn until one
+/// has the required sign and has not been flipped in the same bin; the required signs alternate, +1
+/// first.
 ///
 /// Throws std::invalid_argument where LIBSDNN would refuse the setting or not terminate.
 inline coding::PatternTable libsdnn_patterns(const coding::RandomInverseConfig& config,
@@ -120,16 +124,15 @@ inline coding::PatternTable libsdnn_patterns(const coding::RandomInverseConfig& 
   return table;
 }
 
-/// The tables of LIBSDNN's desensitization, two for each pair, the modifier's first.
+/// The tables of LIBSDNN's desensitization: separate ones for each pair of inputs and role.
 struct LibsdnnTables {
   std::vector<coding::PatternTable> modified;
   std::vector<coding::PatternTable> modifiers;
 };
 
-/// Draws the tables in LIBSDNN's order.
-///
-/// Shapes: inputs, one configuration per input. Throws std::invalid_argument for a pair of an
-/// unknown input, or where LIBSDNN would refuse a setting or not terminate.
+/// Draws the tables in LIBSDNN's order: for each pair that of the modifier, then that of the
+/// modified input. `inputs` has a configuration for each input. Throws std::invalid_argument for a
+/// pair of an unknown input, or where LIBSDNN would refuse a setting or not terminate.
 inline LibsdnnTables libsdnn_tables(std::span<const coding::RandomInverseConfig> inputs,
                                     std::span<const coding::InputPair> pairs,
                                     LibsdnnRandom& random) {
@@ -144,13 +147,14 @@ inline LibsdnnTables libsdnn_tables(std::span<const coding::RandomInverseConfig>
   return tables;
 }
 
-/// The initial weights of LIBSDNN, drawn by units, the threshold before the weights.
+/// The initial weights and thresholds of a LIBSDNN network.
 struct LibsdnnWeights {
   std::vector<std::int32_t> weights;     ///< (n_units, n_columns)
   std::vector<std::int32_t> thresholds;  ///< (n_units,)
 };
 
-/// Draws weights and thresholds in LIBSDNN's order, uniformly in [low, high]. Throws
+/// Draws weights and thresholds, uniformly in [low, high], in LIBSDNN's order: for each unit the
+/// threshold, then the weights. Throws
 /// std::invalid_argument unless low <= high and both are in [-10^6, 10^6].
 inline LibsdnnWeights libsdnn_weights(std::size_t n_units, std::size_t n_columns, int low, int high,
                                       LibsdnnRandom& random) {

@@ -1,4 +1,4 @@
-/// A layer for single samples, with weights in bytes, whose changes are undone on failure.
+/// A layer that learns single samples; a failed call changes nothing.
 #pragma once
 
 #include <algorithm>
@@ -21,15 +21,17 @@
 
 namespace sdnn::estimators {
 
-/// Learns and predicts single samples with the bits of plain training.
+/// A copy of a layer's weights that learns and predicts single samples, with the results of plain
+/// training.
 ///
-/// The weights are bytes, with second bytes where needed, so that a pass reads a quarter of the
-/// layer's memory. The layer is out of date until synchronize(); nothing else may change it.
-/// Memory: about 2 bytes per weight, of which the second is touched only where needed.
+/// The copy has a byte for each weight, and a second byte where that is not enough, so that a pass
+/// reads a quarter of the layer's memory. The layer itself is out of date until synchronize();
+/// nothing else may change it. Memory: about 2 bytes per weight; pages of second bytes are used
+/// only where needed.
 class OnlineLayer {
  public:
-  /// Throws std::invalid_argument if a weight or threshold does not fit (|weight| up to 16383, less
-  /// with more than 2^16 columns), or if there are more than 2^27 columns.
+  /// Copies the weights of `layer`. Throws std::invalid_argument if a weight or threshold does not
+  /// fit (see HiddenLayer::weight_limit), or if there are more than 2^27 columns.
   explicit OnlineLayer(std::shared_ptr<ParallelPerceptron> layer)
       : layer_(std::move(layer)),
         hidden_(layer_->n_units(), layer_->code().n_slots()),
@@ -109,7 +111,7 @@ class OnlineLayer {
     }
   }
 
-  /// Updates the layer's weights and thresholds.
+  /// Copies weights and thresholds back to the layer, if any has changed.
   void synchronize() {
     if (!changed_) return;
     WeightTiles<std::int32_t>& tiles = layer_->tiles();
@@ -129,6 +131,7 @@ class OnlineLayer {
     std::vector<std::uint32_t> units;
   };
 
+  /// Lists the columns of a sample's code in `slots_`.
   void read(std::span<const std::int32_t> bins) {
     std::uint64_t* const positive = words_.data() + layer_->code().n_words();
     layer_->code().encode(bins, words_.data(), positive);
@@ -150,7 +153,8 @@ class OnlineLayer {
     }
   }
 
-  /// Takes back all recorded corrections, the last one first.
+  /// Reverses all corrections recorded by the current call, the last one first. Shapes: bins as in
+  /// present.
   void undo(std::span<const std::int32_t> bins) {
     const std::size_t n_inputs = layer_->code().n_inputs();
     for (; !applied_.empty(); applied_.pop_back()) {

@@ -32,19 +32,19 @@ namespace sdnn::estimators {
 /// The limit of the bytes of a layer's weights, 4 GiB.
 inline constexpr std::uint64_t kMaxWeightBytes = std::uint64_t{1} << 32;
 
-/// A layer of `n_units` units over the columns of a code: potential = weights . x_SD - threshold,
-/// firing if > 0.
+/// A layer of `n_units` units over the columns of a code. A unit's potential is weights . x_SD -
+/// threshold; it fires if that is above 0.
 ///
 /// No potential can overflow: for every unit, |threshold| plus the sum of |weights| is below 2^31,
-/// which is checked for weights of every source.
+/// which is checked wherever weights come from.
 ///
 /// Source: Nonaka, Tanaka, Morita 2011. Thread safety: const calls may run at the same time.
 class ParallelPerceptron {
  public:
   using Code = coding::SelectiveDesensitization;
 
-  /// Weights and thresholds are drawn uniformly from the integers in [-initial_range,
-  /// initial_range], unit by unit, the threshold first.
+  /// Draws weights and thresholds uniformly from the integers in [-initial_range, initial_range],
+  /// unit by unit, the threshold first.
   ///
   /// Throws std::invalid_argument unless n_units is in [1, 2^20] and initial_range in [0, 10^6],
   /// std::length_error if the weights have more than kMaxWeightBytes. The computation may be
@@ -108,7 +108,7 @@ class ParallelPerceptron {
     }
   }
 
-  /// The weights for trainers, which must call check_norms() to preserve the layer's bounds.
+  /// The weights for trainers, who must use check_norms() to ensure that no potential can overflow.
   WeightTiles<std::int32_t>& tiles() noexcept {
     narrow_.reset();
     return weights_;
@@ -148,10 +148,10 @@ class ParallelPerceptron {
   /// Calls consume(layer, query, potentials) once for each layer and query, in any order and from
   /// up to `n_threads` threads at a time.
   ///
-  /// Similar queries share most of their code, which a walk by short steps uses; in other walks
-  /// many queries share the contribution of a pair of inputs. Shapes: bins (n_queries, n_inputs),
+  /// Potentials are derived from those of a similar query or, if few are similar, summed by pairs
+  /// of inputs, whose contributions many queries share. Shapes: bins (n_queries, n_inputs),
   /// potentials (n_padded_units,), whose first n_units are valid. Throws std::invalid_argument for
-  /// no layers or layers that differ in their code or size, bins out of range or n_threads < 1.
+  /// no layers or layers that differ in code or size, bins out of range or n_threads < 1.
   template <class Consume>
   static void for_each_query(Layers layers, std::span<const std::int32_t> bins, int n_threads,
                              const Consume& consume) {
@@ -198,8 +198,8 @@ class ParallelPerceptron {
     for_each_query(bins, n_threads, copy);
   }
 
-  /// The number of units in each of n_groups. Throws std::invalid_argument unless it divides
-  /// n_units.
+  /// Returns the number of units in each of n_groups equal groups. Throws std::invalid_argument
+  /// unless it divides n_units.
   std::size_t group_size(std::size_t n_groups) const {
     core::require(n_groups > 0 && n_units() % n_groups == 0, "n_groups",
                   "a divisor of n_units = " + std::to_string(n_units()), n_groups);
@@ -252,9 +252,9 @@ class ParallelPerceptron {
     return slots;
   }
 
-  /// The weights in 16 bits, which halves the memory to read, if the sums over chunks fit.
+  /// The weights in 16 bits, which halves the memory to read, if the sums of a unit's |weights| in
+  /// each chunk of columns fit, too; otherwise n_chunks is 0 and there are no tiles.
   struct Narrow {
-    /// Copies the weights if they fit; otherwise n_chunks is 0 and there are no tiles.
     Narrow(const Code& code, const WeightTiles<std::int32_t>& weights) {
       std::int64_t largest = 1;  // bound of the sum of a unit's |weights| in a chunk
       for (const PairChunk& chunk : pair_chunks(code)) {
@@ -270,8 +270,8 @@ class ParallelPerceptron {
       tiles = WeightTiles<std::int16_t>(weights);
       n_per_sum = static_cast<std::size_t>(kLargest / std::max(tiles.largest(), std::int64_t{1}));
     }
-    std::size_t n_chunks;       // chunks whose total fits into 16 bits
-    std::size_t n_per_sum = 0;  // weights whose sum fits into 16 bits
+    std::size_t n_chunks;       // number of chunks whose total sum fits into 16 bits
+    std::size_t n_per_sum = 0;  // number of weights whose sum fits into 16 bits
     WeightTiles<std::int16_t> tiles;
   };
 
@@ -358,7 +358,7 @@ class ParallelPerceptron {
       code_->encode(bins.subspan(query * code_->n_inputs(), code_->n_inputs()), now, now + n_words);
       const coding::TernaryCode next{now, now + n_words};
       slots.read_changes({before, before + n_words}, next);
-      // Counting takes time too, and pays off for codes that differ much.
+      // A code may be nearer to zero. Counting takes time, and so is done after large changes only.
       const std::size_t n_changes = slots.columns().size();
       if (n_changes > code_->max_active() / 2 && n_changes > coding::n_active(next, n_words)) {
         start_from_zero(values.data());
@@ -391,8 +391,8 @@ class ParallelPerceptron {
     return n_changes < kChangesPerWord * n_steps * n_words;
   }
 
-  /// The number of queries of a thread between two checks for an interruption, for about `n_added`
-  /// additions of a weight, which take about a tenth of a second.
+  /// Returns the number of queries of a thread between two checks for an interruption, such that
+  /// they need about `n_added` additions of weights.
   std::size_t most_at_once(std::uint64_t n_added) const noexcept {
     const std::uint64_t n_added_per_query = std::uint64_t{code_->n_slots()} * n_padded_units();
     return static_cast<std::size_t>(
@@ -435,10 +435,10 @@ class ParallelPerceptron {
     }
   }
 
-  static constexpr std::size_t kFewQueries = 8;      // too few to narrow weights
-  static constexpr std::size_t kChangesPerWord = 4;  // more make walks by pairs faster than a sweep
+  static constexpr std::size_t kFewQueries = 8;  // for so few, weights are not copied to 16 bits
+  static constexpr std::size_t kChangesPerWord = 4;  // above it a sum by pairs beats a sweep
+  // Additions of weights in a tenth of a second; a sum by pairs skips most of them.
   static constexpr std::uint64_t kSweptAtOnce = std::uint64_t{1} << 32;
-  /// Additions of weights in a tenth of a second; walks of pairs skip most of them.
   static constexpr std::uint64_t kAddedAtOnce = std::uint64_t{1} << 36;
 
   std::shared_ptr<const Code> code_;

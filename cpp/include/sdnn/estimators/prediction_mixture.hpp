@@ -16,11 +16,13 @@
 
 namespace sdnn::estimators {
 
-/// Weights experts by the inverse eighth power of their discounted mean squared errors.
+/// A mixture that weights experts by the inverse eighth power of their discounted mean squared
+/// errors.
 ///
-/// This is the posterior of experts whose errors are normal, of unknown variance, and known from 16
-/// samples. An error counts as at most five times the root mean square of the worst expert's, so
-/// that an outlier does not make all experts alike. Results have the same bits on every machine.
+/// These are the posterior probabilities of experts whose errors are normal with unknown variances
+/// estimated from 16 samples. An error is limited to five times the root mean square of the worst
+/// expert's errors, so that an outlier does not make all experts alike. Results have the same bits
+/// on every machine.
 ///
 /// Source: Littlestone, N., Warmuth, M. K. (1994). The weighted majority algorithm. Information and
 /// Computation 108, with the discounts of Herbster, M., Warmuth, M. K. (1998). Tracking the best
@@ -43,7 +45,8 @@ class PredictionMixture {
     std::vector<double> weights = priors_;
     const double total = std::accumulate(losses_.begin(), losses_.end(), 0.0);
     if (total > 0.0) {
-      // Few errors are mixed with the mean of all experts.
+      // The mean loss of all experts is added as that of kPriorSamples samples, so that the first
+      // few errors do not decide.
       const double common = kPriorSamples * (total / static_cast<double>(n)) / count_;
       const double least = *std::ranges::min_element(losses_) + common;
       for (std::size_t k = 0; k < n; ++k) {
@@ -68,8 +71,8 @@ class PredictionMixture {
     return std::clamp(sum, *lowest, *highest);
   }
 
-  /// Compares predictions with the target. Shape: (n_experts,). Throws std::invalid_argument for
-  /// another size, and numbers that are not finite.
+  /// Updates the experts' losses by the errors of their predictions. Shape: (n_experts,). Throws
+  /// std::invalid_argument for another size, and numbers that are not finite.
   void learn(std::span<const double> predictions, double target) {
     require_predictions(predictions);
     core::require_finite("target", target);
@@ -124,7 +127,8 @@ class PredictionMixture {
     for (const double prediction : predictions) core::require_finite("predictions", prediction);
   }
 
-  /// Chooses 2^exponent as the unit of errors if squares of them would leave the range of doubles.
+  /// Chooses 2^exponent, the size of the largest error, as the unit of errors if their squares
+  /// would otherwise leave the range of doubles; `worst` is the largest loss.
   void choose_unit(int exponent, double worst) noexcept {
     if (worst > kSmallestLoss && exponent < exponent_ + kMostBits) return;
     const int change = std::clamp(2 * (exponent_ - exponent), -kLargestExponent, kLargestExponent);

@@ -12,16 +12,18 @@
 
 namespace sdnn::estimators {
 
-/// Weights experts by the likelihood of recent labels: e to the sum of discounted log likelihoods.
+/// A mixture that weights candidates by the likelihood of recent labels: e to the discounted sum of
+/// the logarithms of the probabilities that they gave to the labels.
 ///
-/// The first expert estimates shares of classes; each other one gives scores, whose softmax counts
-/// as three experts, of steepness 3, 6 and 12, so that the steepness is learned too. Results have
-/// the same bits on every machine.
+/// The first candidate is an estimate of the shares of classes. Each scorer gives a score for every
+/// class; softmax(3 score), softmax(6 score) and softmax(12 score) are three candidates, so that
+/// the steepness is learned, too. Results have the same bits on every machine.
 ///
 /// Source: as PredictionMixture, for the logarithmic loss, with which the weights are a posterior.
 class ProbabilityMixture {
  public:
-  /// Throws std::invalid_argument for more than 1,000 experts.
+  /// Makes a mixture of shares and `n_scorers` scorers, all with equal weights. Throws
+  /// std::invalid_argument for more than 1,000 scorers.
   explicit ProbabilityMixture(std::size_t n_scorers) : losses_(1 + kSteepnesses * n_scorers) {
     core::require_in_range("n_scorers", n_scorers, 0, kMostScorers);
   }
@@ -57,7 +59,8 @@ class ProbabilityMixture {
     normalize(out);
   }
 
-  /// Compares estimates with the label, the index of a class. Shapes and errors: see mix.
+  /// Updates the weights by the probabilities that the candidates give to the label, the index of a
+  /// class. Shapes and errors: see mix.
   void learn(std::span<const double> shares, std::span<const double> scores, std::size_t label) {
     core::require_below("label", label, shares.size());
     const std::vector<double> candidates = probabilities(shares, scores);
@@ -77,23 +80,24 @@ class ProbabilityMixture {
   }
 
  private:
-  static constexpr std::size_t kSteepnesses = 3;
-  static constexpr double kSteepness = 3.0;  ///< the smallest; each other one is twice as large
+  static constexpr std::size_t kSteepnesses = 3;  ///< candidates of a scorer: 3, 6 and 12
+  static constexpr double kSteepness = 3.0;       ///< the smallest
   static constexpr std::size_t kMostScorers = 1000;
-  static constexpr double kDiscount = 0.99;  ///< factor of a logarithm per later sample
+  static constexpr double kDiscount = 0.99;  ///< factor of a loss for each later sample
   /// An estimate is at least kLeastProbability, or kLeastOfAll / n_classes if that is less, so that
   /// no label has an infinite loss.
   static constexpr double kLeastProbability = 1e-3, kLeastOfAll = 0.1;
   static constexpr double kLeastWeight = 1e-3;  ///< so that an expert can recover after a drift
   static constexpr double kLargestLoss = 1e6;
 
+  /// Divides values by their sum.
   static void normalize(std::span<double> values) noexcept {
     double sum = 0.0;
     for (const double value : values) sum += value;
     for (double& value : values) value /= sum;
   }
 
-  /// The weights of the candidates: the shares, and each scorer with each steepness.
+  /// The weights of the candidates: the shares, then each scorer with each steepness.
   std::vector<double> candidate_weights() const {
     const double least = *std::ranges::min_element(losses_);
     std::vector<double> weights;
@@ -104,7 +108,8 @@ class ProbabilityMixture {
     return weights;
   }
 
-  /// The estimates of all candidates, each at least kLeastProbability before they are normalized.
+  /// Returns the probabilities of classes of all candidates, shape (n_candidates, n_classes). Each
+  /// is raised to the least probability, and then the candidate's are normalized again.
   std::vector<double> probabilities(std::span<const double> shares,
                                     std::span<const double> scores) const {
     const std::size_t n = shares.size();
@@ -121,7 +126,7 @@ class ProbabilityMixture {
       for (std::size_t c = 0; c < n; ++c) {
         const double raised = core::exp(kSteepness * (of_scorer[c] - largest));
         first[c] = raised;
-        first[n + c] = raised * raised;
+        first[n + c] = raised * raised;  // twice the steepness squares the exponential
         first[2 * n + c] = first[n + c] * first[n + c];
       }
     }

@@ -18,17 +18,17 @@ namespace sdnn::estimators {
 
 /// Recursive least squares with exponential forgetting, for any number of outputs.
 ///
-/// Inputs are measured in half widths of their first range, from its middle. A missing input, NaN,
-/// counts as the middle. The ranges grow with the inputs, each time by at most their width on
-/// either side, and inputs beyond that are clipped. Outputs are clipped to the range of the learned
-/// targets and a fifth of its width. Errors may be limited to a multiple of their mean size. Thus
-/// no number overflows, and outliers do little damage.
+/// Inputs are scaled to distances from the middle of their first range, in half widths. A missing
+/// input, NaN, counts as the middle. The ranges grow with the inputs, at each sample by at most
+/// their width on either side; inputs beyond that are clipped. Outputs are clipped to the range of
+/// the learned targets, widened by a fifth on either side. Errors may be limited to a multiple of
+/// their mean size. Thus no number overflows, and outliers do little damage.
 ///
 /// All sums have a fixed order, so that results have the same bits on every machine.
 ///
 /// Source: Haykin, S. (2002). Adaptive Filter Theory, chapter 9, with a bound on the trace of the
 /// covariance, which would otherwise grow without limit along directions that no input has.
-/// Cost: (n_inputs + 1)^2 multiplications and additions, three times.
+/// Cost: learning needs 3 (n_inputs + 1)^2 multiplications and additions.
 class RecursiveLeastSquares {
  public:
   static constexpr double kUnlimited = std::numeric_limits<double>::infinity();
@@ -155,10 +155,11 @@ class RecursiveLeastSquares {
   }
 
  private:
-  static constexpr double kFirstVariance = 10.0;  ///< of a weight, for errors of variance 1
-  static constexpr double kLargestMean = 100.0;   ///< of the variances of all weights
-  static constexpr double kMargin = 0.2;          ///< share of the range of targets
-  static constexpr double kFarthest = 1e6;        ///< half widths from the middle
+  static constexpr double kFirstVariance = 10.0;  ///< of a weight, if errors have the variance 1
+  static constexpr double kLargestMean = 100.0;   ///< limit of the mean of the weights' variances
+  static constexpr double kMargin = 0.2;  ///< by which outputs may leave the range of targets, as a
+                                          ///< share of it
+  static constexpr double kFarthest = 1e6;  ///< limit of scaled inputs, in half widths
 
   /// Clips an input to its range, extended by its width on either side.
   double clipped(std::size_t i, double input) const noexcept {
@@ -167,8 +168,8 @@ class RecursiveLeastSquares {
                       detail::finite(high_[i] + width));
   }
 
-  /// Widens the ranges to the inputs. A range of a single value, which stays the middle, gets the
-  /// distance of the second value as its half width.
+  /// Widens the ranges so that they contain the inputs. Where the first range is a single value,
+  /// the half width becomes the distance of the first other value.
   void widen(std::span<const double> inputs) noexcept {
     for (std::size_t i = 0; i < inputs.size(); ++i) {
       if (std::isnan(inputs[i])) continue;
@@ -189,14 +190,15 @@ class RecursiveLeastSquares {
     }
   }
 
-  /// The output, clipped to the range of the targets with its margin.
+  /// Returns output o, clipped to the range of its targets with the margin. Shape: columns
+  /// (n_inputs + 1,), as scale writes them.
   double output(std::size_t o, std::span<const double> columns) const noexcept {
     const double margin = kMargin * (highest_[o] / 2.0 - lowest_[o] / 2.0) * 2.0;
     return std::clamp(unlimited_output(o, columns), detail::finite(lowest_[o] - margin),
                       detail::finite(highest_[o] + margin));
   }
 
-  /// The output before it is clipped, on which learning is based.
+  /// Returns output o before it is clipped; its error is learned.
   double unlimited_output(std::size_t o, std::span<const double> columns) const noexcept {
     const double* const weights = &weights_[o * columns.size()];
     double sum = 0.0;
@@ -205,7 +207,8 @@ class RecursiveLeastSquares {
     return std::isnan(value) ? origins_[o] : detail::finite(value);
   }
 
-  /// Writes the product of covariance and columns, and returns that of columns and product.
+  /// Writes P x, and returns x^T P x, the variance of an output at the columns x, P being the
+  /// covariance. If rounding errors have made it negative or too large, the covariance is reset.
   double product(std::span<const double> columns, std::span<double> out) {
     const std::size_t n = columns.size();
     const auto multiply = [&] {
@@ -221,10 +224,11 @@ class RecursiveLeastSquares {
     };
     const double variance = multiply();
     if (variance >= 0.0 && variance < detail::kLargest) return variance;
-    reset_covariance();  // rounding errors added up
+    reset_covariance();
     return multiply();
   }
 
+  /// Sets the covariance to that before the first sample.
   void reset_covariance() noexcept {
     const std::size_t n = n_inputs() + 1;
     std::ranges::fill(covariance_, 0.0);
@@ -238,8 +242,8 @@ class RecursiveLeastSquares {
     if (!core::are_finite({weights, gains.size()})) std::fill_n(weights, gains.size(), 0.0);
   }
 
-  /// Updates the covariance of the weights by a sample. Forgetting lets it grow where inputs do not
-  /// vary, so its trace is limited; it begins anew if it has overflowed.
+  /// Updates the covariance of the weights by a sample. Forgetting lets it grow in directions in
+  /// which inputs do not vary, so its trace is limited; it is reset if it has overflowed.
   void update_covariance(std::span<const double> gains, double factor) noexcept {
     const std::size_t n = gains.size();
     const double growth = 1.0 / forgetting_;

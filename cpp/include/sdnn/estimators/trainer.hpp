@@ -33,7 +33,8 @@ namespace sdnn::estimators {
 template <class Rule>
 class Trainer {
  public:
-  /// Takes the samples, whose targets or labels the rule has, and chooses the form of training.
+  /// Takes the samples, whose targets or labels `rule` has, and chooses the form of training for
+  /// about `n_epochs` presentations of each sample.
   /// Shapes: bins (n_samples, n_inputs). Throws std::invalid_argument for bins out of range or if
   /// the rule is for another number of samples or units, std::length_error if `form` (other than
   /// automatic) needs more than `memory_limit` bytes.
@@ -102,8 +103,9 @@ class Trainer {
       std::variant<PlainTraining, BlockTraining<std::int16_t>, BlockTraining<std::int32_t>,
                    DualTraining<std::int16_t>, DualTraining<std::int32_t>>;
 
-  /// Computes how many presentations are safe before potentials could overflow: each increases a
-  /// unit's norm by at most 1 for each active column and 1 for the threshold.
+  /// Computes how many presentations are safe before a potential could overflow: each raises the
+  /// sum of a unit's |weights| and |threshold| by at most the number of active columns plus 1.
+  /// Throws std::overflow_error if none is safe.
   void renew_headroom() {
     const std::int64_t left = std::numeric_limits<std::int32_t>::max() - layer_->check_norms();
     headroom_ = static_cast<std::size_t>(left) / (layer_->code().max_active() + 1);
@@ -114,7 +116,7 @@ class Trainer {
     }
   }
 
-  /// Makes the training of the chosen form, with the smallest integers that hold inner products.
+  /// Makes the training of the chosen form, with the smallest type that holds all inner products.
   void make_training(std::span<const std::int32_t> bins, int n_threads, bool keeps_plans) {
     const auto make = [&]<class Form>(std::in_place_type_t<Form> form, auto... arguments) {
       training_ = std::make_unique<Training>(form, layer_, bins, n_threads, arguments...);

@@ -1,4 +1,5 @@
-/// Potentials of recent states, kept exact while the network learns, by a log of its corrections.
+/// The potentials of recent states, which a log of a layer's corrections keeps exact while the
+/// network learns.
 #pragma once
 
 #include <algorithm>
@@ -22,13 +23,15 @@
 
 namespace sdnn::approximators {
 
-/// The last kSize corrections of a layer's weights, numbered from 0.
+/// The last kSize corrections of a layer's weights. All corrections are numbered from 0.
 ///
-/// A layer with other weights has a log with another identity. Results that were computed from the
-/// layer can thus be checked, and updated by the later corrections.
+/// Whoever keeps results computed from the layer notes the log's identity and size, and can later
+/// tell which corrections they lack. When the weights are replaced as a whole, the log gets another
+/// identity, and such results are void.
 class CorrectionLog {
  public:
-  /// Cached potentials that miss more corrections are computed anew, which is then faster.
+  /// Cached potentials that lack more corrections than this are computed anew, which is then
+  /// faster.
   static constexpr std::size_t kSize = 512;
 
   /// A correction: w_i += step * x_SD(bins) and w_i0 -= step for every i in `units`.
@@ -58,7 +61,7 @@ class CorrectionLog {
   /// The number of corrections since the beginning.
   std::uint64_t size() const noexcept { return size_; }
 
-  /// A correction, one of the last kSize.
+  /// Returns the correction with this number, which must be one of the last kSize.
   Entry operator[](std::uint64_t number) const noexcept {
     assert(number < size_ && size_ - number <= kSize);
     const std::size_t slot = number % kSize;
@@ -102,7 +105,7 @@ namespace detail {
 inline constexpr std::size_t kCacheEntries = 64;
 using Distances = std::array<std::int32_t, kCacheEntries>;
 
-/// Sums |cached bin - bin| over the inputs, for as many cached states at once as `distances` has.
+/// Implements add_up_distances, below.
 SDNN_INLINE void add_up_distances_body(const coding::Bin* cached, std::span<const coding::Bin> bins,
                                        Distances& distances) noexcept {
   Distances sums{};
@@ -115,7 +118,8 @@ SDNN_INLINE void add_up_distances_body(const coding::Bin* cached, std::span<cons
 
 }  // namespace detail
 
-/// The distances of a state from the cached ones, in bins. Shape: cached (l, kCacheEntries).
+/// Writes the distances of a state from all cached states: the sums of |cached bin - bin| over the
+/// inputs. Shapes: cached (l, kCacheEntries), bins (l,).
 SDNN_KERNEL(void, add_up_distances,
             (const coding::Bin* cached, std::span<const coding::Bin> bins,
              detail::Distances& distances),
@@ -123,11 +127,15 @@ SDNN_KERNEL(void, add_up_distances,
 
 /// A cache of the inner potentials of the states that were evaluated last with a workspace.
 ///
-/// Most states of a network are equal or near to earlier ones. Two exact identities use this: a
-/// correction of w_i by step * x_SD(s) moves h_i(s') by step * (<x_SD(s), x_SD(s')> + 1), so a
-/// cached state is updated by one integer product for each later correction; and h(s') - h(s) = W
-/// (x_SD(s') - x_SD(s)) touches only the columns in which the codes differ. The cheapest way by
-/// estimate is used: from a cached state, or by a full pass. Both give the same integers.
+/// Most states are equal or near to earlier ones. Two exact identities use this:
+///
+/// - A correction of w_i by step * x_SD(s), and of w_i0 by -step, changes h_i(s') by step *
+///   (<x_SD(s), x_SD(s')> + 1). A cached state is thus updated by one integer product for each
+///   later correction.
+/// - h(s') - h(s) = W (x_SD(s') - x_SD(s)) needs only the columns in which the two codes differ.
+///
+/// The potentials of a state come from a cached state or from a full pass, whichever is estimated
+/// to be cheaper. Both give the same integers.
 ///
 /// Any number of caches may follow a layer through its CorrectionLog.
 class ActivationCache {
@@ -143,7 +151,7 @@ class ActivationCache {
     std::uint64_t exact = 0;      ///< the state was cached
     std::uint64_t neighbour = 0;  ///< derived from a cached neighbour
     std::uint64_t full = 0;       ///< a full pass
-    std::uint64_t columns = 0;    ///< columns added, by passes and from neighbours
+    std::uint64_t columns = 0;    ///< columns of weights added, for `full` and `neighbour`
   };
 
   ActivationCache(const coding::StateCode& code, std::size_t n_units)
@@ -156,11 +164,12 @@ class ActivationCache {
         to_(code),
         changes_(code.column_lists()),
         listed_{Listed(code), Listed(code)} {
-    // Costs are estimated in columns, for an input with k partners. Neighbouring bins differ in
+    // Costs are estimated in columns, for an input with p partners. Neighbouring bins differ in
     // `differing` units of a pattern, measured over ten bins: about m / 2 / 45, because half of the
     // m units differ between two anchors that are 45 bins apart. Where the pattern is modified, in
-    // k groups, half of these units are active and change two columns. Where it is the modifier, a
-    // unit switches a unit in each of k groups, which are k / 2 columns of the paired code.
+    // p groups, half of these units are active, and each changes two columns of the paired code: p
+    // columns for each differing unit. Where it is the modifier, a unit switches a unit in each of
+    // p groups, which are p / 2 columns of the paired code.
     const double l = static_cast<double>(code.n_inputs());
     const coding::PatternTable& table = code.table(0);
     const double differing = static_cast<double>(table[0].distance(
@@ -185,15 +194,16 @@ class ActivationCache {
   const Counts& counts() const noexcept { return counts_; }
   std::size_t n_units() const noexcept { return n_units_; }
 
-  /// The potentials of the state with these bins, for the layer's current weights; valid until the
-  /// next call. `log` has all corrections of the layer.
+  /// Returns the potentials of the state with these bins, for the layer's current weights; valid
+  /// until the next call. `log` must be the log of `hidden_layer`.
   Entry recall(const coding::StateCode& code, const HiddenLayer& hidden_layer,
                const CorrectionLog& log, std::span<const coding::Bin> bins) {
     if (layer_ != log.identity()) {
       last_use_.fill(0);
       layer_ = log.identity();
     }
-    for (const std::size_t slot : {latest_, before_latest_}) {  // likely within a decision
+    // A decision and the learning step after it usually read the same two states.
+    for (const std::size_t slot : {latest_, before_latest_}) {
       if (last_use_[slot] != 0 && std::ranges::equal(bins_of(slot), bins) &&
           log.size() - up_to_[slot] <= CorrectionLog::kSize) {
         return use(code, log, slot);
@@ -245,8 +255,8 @@ class ActivationCache {
     return use(code, log, oldest);
   }
 
-  /// The columns of the state with these bins, which are computed unless it is one of the last two
-  /// states; valid until the next call of any member.
+  /// Returns the columns of the state with these bins. They are listed anew unless it is one of the
+  /// last two states whose columns were listed; valid until the next call of any member.
   coding::SignedColumns columns(const coding::StateCode& code, std::span<const coding::Bin> bins) {
     for (const Listed& listed : listed_) {
       if (std::ranges::equal(listed.bins, bins)) return listed.lists.columns();
@@ -286,7 +296,7 @@ class ActivationCache {
     return {bins_.data() + slot * n_inputs_, n_inputs_};
   }
 
-  /// Lists the columns of a state, and replaces the list before the last.
+  /// Lists the columns of a state, in place of the older one of two kept lists.
   coding::SignedColumns list(const coding::StateCode& code, std::span<const coding::Bin> bins) {
     std::swap(listed_[0], listed_[1]);
     listed_[0].bins.assign(bins.begin(), bins.end());
@@ -294,7 +304,8 @@ class ActivationCache {
     return listed_[0].lists.columns();
   }
 
-  /// Marks a slot as just used and updates its potentials.
+  /// Updates the potentials of a slot by the corrections that they lack, and marks the slot as just
+  /// used.
   Entry use(const coding::StateCode& code, const CorrectionLog& log, std::size_t slot) {
     const Entry entry{bins_of(slot), {potentials_.data() + slot * n_units_, n_units_}};
     std::int32_t* const potentials = potentials_.data() + slot * n_units_;
@@ -311,14 +322,13 @@ class ActivationCache {
 
   std::uint64_t layer_ = 0;  ///< the identity of the layer of the slots
 
-  // The following arrays are ordered by slot.
   std::size_t n_inputs_;
   std::size_t n_units_;
   std::vector<coding::Bin> bins_;                   ///< [slot][input]
   std::vector<coding::Bin> bins_by_input_;          ///< [input][slot], for quick comparison
   std::vector<std::int32_t> potentials_;            ///< [slot][unit]
-  std::array<std::uint64_t, kEntries> up_to_{};     ///< number of corrections included
-  std::array<std::uint64_t, kEntries> last_use_{};  ///< 0: empty
+  std::array<std::uint64_t, kEntries> up_to_{};     ///< by slot, the number of corrections included
+  std::array<std::uint64_t, kEntries> last_use_{};  ///< by slot, a time of clock_; 0: empty
   std::uint64_t clock_ = 0;
   std::size_t latest_ = 0;
   std::size_t before_latest_ = 0;

@@ -1,4 +1,4 @@
-/// Lists of the weights that need more than a byte.
+/// Lists of the high bytes of weights that need more than a byte.
 #pragma once
 
 #include <algorithm>
@@ -19,8 +19,8 @@ struct HighByte {
   std::int8_t value;
 };
 
-/// The high bytes of each block other than 0. A block that had more than `capacity` is overfull
-/// from then on: its high bytes are counted and not listed.
+/// The lists of the high bytes other than 0, one for each block of units. A block that ever had
+/// more than `capacity` of them stays overfull: its high bytes are counted and no longer listed.
 class HighByteLists {
  public:
   HighByteLists() = default;
@@ -39,14 +39,16 @@ class HighByteLists {
     return {lists_.data() + block * capacity_, is_overfull(block) ? 0 : sizes_[block]};
   }
 
-  /// Writes to all memory, without a change.
+  /// Writes to all memory of the lists, without a change of values, so that the operating system
+  /// provides its pages now.
   void touch_memory() noexcept {
     for (HighByte& high : lists_.span()) {
       std::int8_t volatile& value = high.value;
       value = value;
     }
   }
-  /// Changes the value of a high byte from `before`.
+  /// Records that the high byte of a column and unit of the block changes from the value `before`
+  /// to that of `now`. A byte that becomes 0 leaves the list, and the last entry takes its place.
   void change(std::size_t block, std::int8_t before, const HighByte& now) noexcept {
     if (before == now.value) return;
     const std::size_t size = sizes_[block];

@@ -1,4 +1,5 @@
-/// Moves of whole rows of a linear readout, as imitation makes them, and the range of its weights.
+/// Member functions of LinearSDNN that are used outside the usual step of learning: moves of whole
+/// rows, for imitation, and doublings of the unit that keep weights in their range.
 #pragma once
 
 #include <algorithm>
@@ -14,8 +15,8 @@
 
 namespace sdnn::approximators {
 
-/// Doubles the unit of weights until all are below kLargestWeight; `used` has all bits that any
-/// weight uses.
+/// Doubles the unit, which halves the weights, until all are below kLargestWeight in size. `used`
+/// has the bits that are set in the magnitude of any weight.
 inline void LinearSDNN::shrink_weights(std::int32_t used) noexcept {
   while (used >= kLargestWeight) {
     double_unit();
@@ -25,7 +26,8 @@ inline void LinearSDNN::shrink_weights(std::int32_t used) noexcept {
   }
 }
 
-/// Moves the value of every row by rate * error, in equal steps of the weights that the code uses.
+/// Moves the sum of every row over the code by rate * error, in equal steps of the weights that the
+/// code uses.
 inline int LinearSDNN::move_rows(const Code& code, std::span<const std::int64_t> errors,
                                  std::int32_t rate) {
   assert(errors.size() == n_rows());

@@ -15,17 +15,20 @@
 
 namespace sdnn::approximators {
 
-/// The change of a row and its trace, in fixed-point numbers whose products fit into 32 bits.
+/// The change of a row of weights and of their traces in a step of learning, in fixed-point numbers
+/// whose products fit into 32 bits.
 struct RowStep {
-  std::int32_t decay;  ///< factor of the trace in [0, 2^13], in units of 2^-13
-  std::int32_t gain;  ///< the code's part of the new trace, in units of 2^-12; 0 outside the action
-  std::int32_t replace;     ///< a mask: the code replaces the trace where it is not 0
-  std::int32_t step;        ///< weights change by step * trace / 2^shift; below 2^13
-  std::int32_t shift;       ///< in [1, 30]
+  std::int32_t decay;    ///< factor of the trace in [0, 2^13], in units of 2^-13
+  std::int32_t gain;     ///< factor of the code that is added to the trace, in units of 2^-12; 0 in
+                         ///< rows outside the action's window
+  std::int32_t replace;  ///< -1: where the code is not 0 it replaces the trace; 0: it is added
+  std::int32_t step;     ///< weights change by step * trace / 2^shift; below 2^13
+  std::int32_t shift;    ///< in [1, 30]
   std::int32_t correction;  ///< subtracted from the weight, times the code
 };
 
-/// The bits that are set in any trace, and in the magnitude of any weight, after a step.
+/// The bits that are set in any trace, and in size_bits of any weight, after a step: traces are all
+/// 0 if `traces` is 0, and the highest bit of `weights` shows the size of the largest weight.
 struct RowUse {
   std::int32_t traces = 0;
   std::int32_t weights = 0;
@@ -52,7 +55,8 @@ constexpr Number halved(Number units) noexcept {
 inline constexpr int kWeightBits = 23;
 inline constexpr std::int32_t kLargestWeight = 1 << kWeightBits;
 
-/// The magnitude of a weight, less 1 for negative weights; its highest bit shows the bits needed.
+/// Returns the magnitude of a weight, minus 1 for a negative weight (the shift makes all ones of
+/// its sign, which flip its bits). The highest set bit tells how many bits the weight needs.
 constexpr std::uint32_t size_bits(std::int32_t weight) noexcept {
   return static_cast<std::uint32_t>(weight ^ (weight >> 31));
 }
@@ -83,7 +87,7 @@ SDNN_INLINE void sum_rows_at_once(const std::int32_t* const* rows, const std::in
   }
 }
 
-/// Writes the sums of weights times signs of all rows, four, two or one at a time.
+/// Implements row_sums, four, two or one rows at a time.
 SDNN_INLINE void row_sums_body(const std::int32_t* const* rows, std::size_t n_rows,
                                const std::int8_t* signs, std::size_t n_columns,
                                std::int64_t* sums) noexcept {
@@ -93,8 +97,9 @@ SDNN_INLINE void row_sums_body(const std::int32_t* const* rows, std::size_t n_ro
   if (i < n_rows) sum_rows_at_once<1>(rows + i, signs, n_columns, sums + i);
 }
 
-/// Decays and increases the traces, and adds their multiples to the weights; with kCorrects, also
-/// subtracts the correction. Integers have the signs of two's complement: x >> 31 is -1 or 0.
+/// Decays the traces, adds the code to them, and adds their multiples to the weights; with
+/// kCorrects it also subtracts the correction. A shift x >> 31 gives -1 for negative x and else 0,
+/// as C++20 integers are two's complement.
 template <bool kCorrects>
 SDNN_INLINE RowUse learn_columns(std::int32_t* weights, std::int32_t* traces,
                                  const std::int8_t* signs, std::size_t n_columns,
@@ -118,8 +123,7 @@ SDNN_INLINE RowUse learn_columns(std::int32_t* weights, std::int32_t* traces,
   return {traces_used, weights_used};
 }
 
-/// Decays and raises a row's traces, and moves its weights. Without a correction, which is the
-/// usual case, the loop is faster.
+/// Implements learn_row. Without a correction, which is the usual case, the loop is faster.
 SDNN_INLINE RowUse learn_row_body(std::int32_t* weights, std::int32_t* traces,
                                   const std::int8_t* signs, std::size_t n_columns,
                                   RowStep step) noexcept {
@@ -127,7 +131,7 @@ SDNN_INLINE RowUse learn_row_body(std::int32_t* weights, std::int32_t* traces,
                               : learn_columns<true>(weights, traces, signs, n_columns, step);
 }
 
-/// Writes the code's entries, +1, 0 or -1, from its words of bits.
+/// Implements spread_signs, below.
 SDNN_INLINE void spread_signs_body(const std::uint64_t* active, const std::uint64_t* positive,
                                    std::size_t n_words, std::int8_t* signs) noexcept {
   for (std::size_t w = 0; w < n_words; ++w) {
@@ -144,14 +148,14 @@ SDNN_KERNEL(void, spread_signs,
              std::int8_t* signs),
             (active, positive, n_words, signs))
 
-/// Computes the product of each row with the code. Requires weights below 2^23 in magnitude.
-/// Shapes: rows and sums (n_rows,), each row and signs (n_columns,).
+/// Computes the inner product of each row of weights with the code. Requires weights below 2^23 in
+/// magnitude. Shapes: rows and sums (n_rows,), each row and signs (n_columns,).
 SDNN_KERNEL(void, row_sums,
             (const std::int32_t* const* rows, std::size_t n_rows, const std::int8_t* signs,
              std::size_t n_columns, std::int64_t* sums),
             (rows, n_rows, signs, n_columns, sums))
 
-/// Returns the product of a row with the code.
+/// Returns the inner product of a row of weights with the code.
 inline std::int64_t row_sum(const std::int32_t* row, const std::int8_t* signs,
                             std::size_t n_columns) {
   std::int64_t sum = 0;
@@ -159,7 +163,8 @@ inline std::int64_t row_sum(const std::int32_t* row, const std::int8_t* signs,
   return sum;
 }
 
-/// Applies a step of learning to a row. Shapes: weights, traces and signs (n_columns,).
+/// Applies a step of learning to a row's traces and weights. Shapes: weights, traces and signs
+/// (n_columns,).
 SDNN_KERNEL(RowUse, learn_row,
             (std::int32_t* weights, std::int32_t* traces, const std::int8_t* signs,
              std::size_t n_columns, RowStep step),
@@ -170,7 +175,7 @@ class LinearSDNN;
 /// The code of a state in the form for products with rows of weights.
 class LinearCode {
  public:
-  /// Columns that are not 0.
+  /// The number of columns that are not 0.
   std::int32_t n_active() const noexcept { return n_active_; }
   /// The code: -1, 0 or +1 for each column.
   const std::vector<std::int8_t>& signs() const noexcept { return signs_; }
@@ -182,8 +187,8 @@ class LinearCode {
   std::int32_t n_active_ = 0;
 };
 
-/// The workspace of a user who reads the model: a state, its code, and the sums of rows over it,
-/// each updated after its weights have changed.
+/// The workspace of a user who reads the model: a state, its code, and the products of rows with
+/// it. A product is computed again when the version of its row has changed.
 class LinearWorkspace {
  public:
   const LinearCode& code() const noexcept { return code_; }
@@ -206,11 +211,12 @@ class LinearTrace {
   LinearTrace(std::size_t n_rows, std::size_t n_columns)
       : n_columns_(n_columns), values_(n_rows * n_columns), live_(n_rows) {}
 
-  /// The traces of a row's weights, to be changed, after which set_live tells whether one is not 0.
+  /// The traces of a row's weights. Whoever changes them must call set_live with whether any is not
+  /// 0.
   std::int32_t* row(std::size_t i) noexcept { return &values_[i * n_columns_]; }
   void set_live(std::size_t i, bool is_live) noexcept { live_[i] = is_live; }
 
-  /// Sets all traces to 0. Rows that are not live have none.
+  /// Sets all traces to 0. Only live rows need it, as the traces of others are 0 already.
   void clear() noexcept {
     for (std::size_t row = 0; row < live_.size(); ++row) {
       if (live_[row]) std::fill_n(&values_[row * n_columns_], n_columns_, 0);

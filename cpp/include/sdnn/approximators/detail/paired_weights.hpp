@@ -1,4 +1,5 @@
-/// Weights in the paper's order and for the paired code, and the initial ones of an SDNN-C.
+/// Conversion of weights between the paper's order and the paired code, and the initial weights and
+/// thresholds of an SDNN-C.
 #pragma once
 
 #include <cmath>
@@ -18,20 +19,22 @@ namespace sdnn::approximators {
 
 using PairedColumns = coding::StateCode::PairedColumns;
 
-/// The weight of a hidden unit for a unit of x_SD. The paired code has columns for the sum and the
-/// difference of two units of x_SD instead of the units; the weight is half the sum of theirs.
+/// Returns the weight of a hidden unit for a unit of x_SD, which has these columns. The paired code
+/// has half sums and half differences of two units; the first unit has half the sum of the two
+/// columns' weights, and the second unit half their difference.
 inline std::int32_t paired_weight(const HiddenLayer& layer, std::size_t unit,
                                   const PairedColumns& columns) noexcept {
   const std::int32_t first = layer.weight(unit, columns.first);
   return columns.paired ? (first + columns.sign * layer.weight(unit, columns.second)) / 2 : first;
 }
 
-/// The largest |weight| for a layer, so that the sum of two weights fits.
+/// Returns the largest |weight| of a unit of x_SD, so that the sum of two, a weight of the paired
+/// code, fits into the layer.
 inline std::int32_t largest_paired_weight(const HiddenLayer& layer) noexcept {
   return layer.weight_limit() / 2;
 }
 
-/// Makes a layer for the paired code with weights and thresholds of zero.
+/// Makes a layer for the paired code whose weights and thresholds are 0.
 inline HiddenLayer paired_layer(const coding::StateCode& code, std::size_t n_units) {
   return {n_units, code.n_columns(), code.n_double_columns()};
 }
@@ -54,7 +57,8 @@ HiddenLayer paired_layer(const coding::StateCode& code, std::size_t n_units, con
   return layer;
 }
 
-/// Adds small random weights to a layer whose weights are zero.
+/// Adds small random weights to a layer whose weights are 0, in the order of the paper's columns.
+/// Throws std::invalid_argument if initial_weight_limit is too large.
 inline void add_initial_weights(HiddenLayer& layer, const coding::StateCode& code,
                                 const SDNNCConfig& config, std::uint64_t seed) {
   const double limit = config.initial_weight_limit * config.lattice;
@@ -68,7 +72,7 @@ inline void add_initial_weights(HiddenLayer& layer, const coding::StateCode& cod
     std::uint64_t bits = 0;
     for (std::size_t i = 0; i < drawn.size(); ++i) {
       if (config.initial_weights == InitialWeights::ternary) {
-        if (i % 32 == 0) bits = random.bits();  // two bits a weight
+        if (i % 32 == 0) bits = random.bits();  // for 32 weights: 1 for bits 01, -1 for 10, 0 else
         drawn[i] = static_cast<std::int32_t>(bits & 1) - static_cast<std::int32_t>(bits >> 1 & 1);
         bits >>= 2;
       } else {
@@ -83,7 +87,8 @@ inline void add_initial_weights(HiddenLayer& layer, const coding::StateCode& cod
 }
 
 /// Sets large thresholds, alternately negative and positive. The paper numbers units from 1, so the
-/// first unit is odd and starts active.
+/// first unit is odd; with a negative threshold it starts active. Throws std::invalid_argument if
+/// initial_threshold is not a whole number of lattice steps.
 inline void set_initial_thresholds(HiddenLayer& layer, const SDNNCConfig& config) {
   const double steps = config.initial_threshold * config.lattice;
   core::require(steps >= 0 && steps < (1 << 30) && std::floor(steps) == steps, "initial_threshold",

@@ -14,16 +14,16 @@
 
 namespace sdnn::approximators {
 
-/// Throws std::length_error if the network, with this number of bins of all inputs, has more bytes
-/// than config.max_table_bytes. It computes with doubles, which no product overflows; their
-/// rounding does not matter.
+/// Throws std::length_error if the network, whose inputs have `n_bins` bins in total, needs more
+/// bytes than config.max_table_bytes. The message names the settings behind the largest part.
+/// Doubles are used because no product overflows them; their rounding does not matter.
 inline void require_room(const SDNNCConfig& config, double n_bins) {
   const coding::ActionCode sizes(config.n_hidden_units, config.n_active_units, config.n_actions);
   const double l = config.n_inputs;
   const double n_units = static_cast<double>(sizes.n_hidden_units());
   const double n_partners = coding::n_partners_of(config);
   const double n_columns = l * n_partners * config.n_pattern_units;
-  // Two bytes for each weight, and four for each column.
+  // Two bytes for each weight, and four of a permutation for each column.
   double weights = 2.0 * n_units * n_columns + 4.0 * n_columns;
   if (config.averaging_interval > 0) {  // the average, its layer and its cache
     weights += WeightAverage::n_bytes(n_units, n_columns) + 2.0 * n_units * n_columns;

@@ -20,11 +20,13 @@
 #include "sdnn/core/detail/check.hpp"
 #include "sdnn/core/random.hpp"
 
-// Config is the configuration of an approximator, with the fields of coding/state_code_config.hpp
-// and a function require_room(config, n_bins).
+// In this file Config is the configuration of an approximator. It has the fields of
+// coding/state_code_config.hpp, and an overload of require_room(config, n_bins), which throws if
+// the approximator would need too much memory.
 
 namespace sdnn::approximators {
 
+/// Returns the number of inputs, after a check of all fields.
 template <class Config>
 std::size_t checked_inputs(const Config& config) {
   core::check_fields(config);
@@ -67,7 +69,8 @@ std::vector<coding::PatternTable> code_books_of(const Config& config, std::uint6
   return tables;
 }
 
-/// Adds a pattern for missing readings to the tables, except those of `symbols`, which have one.
+/// Adds a random pattern, for missing readings, to the end of each table, except to the tables of
+/// inputs with symbols (symbols[mu] > 0), where a symbol already stands for them.
 template <class Config>
 std::vector<coding::PatternTable> with_missing_patterns(const Config& config,
                                                         std::vector<coding::PatternTable> tables,
@@ -81,7 +84,7 @@ std::vector<coding::PatternTable> with_missing_patterns(const Config& config,
   }
   return tables;
 }
-/// The patterns of every input, the last of which stands for missing readings.
+/// Draws the patterns of every input; the last pattern of each stands for missing readings.
 template <class Config>
 std::vector<coding::PatternTable> code_books_with_missing(const Config& config,
                                                           std::uint64_t seed) {
@@ -101,8 +104,9 @@ std::vector<std::size_t> strides_of(const Config& config, std::uint64_t seed) {
   return strides;
 }
 
-/// The number of the random stream of a pair's permutation. Pairs of the first `n_first` inputs are
-/// numbered in the paper's order, then the pairs of each added input.
+/// Returns the number of the random stream that draws a pair's permutation. The pairs among the
+/// first `n_first` inputs are numbered in the paper's order, then come the pairs of each added
+/// input. So the permutations of the first inputs do not depend on how many inputs are added.
 inline std::size_t stream_of_pair(std::size_t mu, std::size_t nu, std::size_t n_first) noexcept {
   const std::size_t last = std::max(mu, nu);
   if (last < n_first) return mu * (n_first - 1) + nu - (nu > mu ? 1 : 0);
@@ -142,13 +146,14 @@ std::shared_ptr<const coding::StateCode> wiring_of(const Config& config,
                                                    strides);
 }
 
-/// Copies rows of weights over a code to rows over a code with more inputs, such that their
-/// products are the same. Both codes have all pairs and equal numbers of units; `to` is 0
-/// elsewhere.
+/// Copies rows of weights for the code `fewer` to rows for the code `more`, which has more inputs,
+/// such that the products of rows and codes stay the same. Both codes have all pairs of their
+/// inputs and equal numbers of units. Elsewhere `to` must be 0. Shapes: from (n_rows, slots of
+/// `fewer`), to (n_rows, slots of `more`).
 ///
-/// In the paired code the groups of a modifier are halves of sums and differences. If their number
-/// is odd, the last group is unpaired, and becomes a sum of two such halves with an additional
-/// group.
+/// In the paired code the groups of a modifier are half sums and half differences of two groups. If
+/// their number is odd, the last group x is unpaired. With more inputs it may get a partner y: then
+/// x = (x + y) / 2 + (x - y) / 2, so both halves get the weight of x.
 inline void copy_to_more_inputs(const coding::StateCode& fewer, std::span<const std::int32_t> from,
                                 const coding::StateCode& more, std::span<std::int32_t> to) {
   const std::size_t n_columns = 64 * more.n_words() / more.n_groups();

@@ -13,8 +13,8 @@
 
 namespace sdnn::approximators {
 
-/// Thermometer codes: unit k of an input is +1 where the input is above threshold k, else -1, with
-/// thresholds at even distances over its bins.
+/// Thermometer codes of inputs: unit k of an input is +1 if the input is above threshold k, and
+/// else -1. The thresholds are evenly spaced over the input's bins.
 ///
 /// The inner product of two such codes falls linearly with the distance of the inputs, from n_units
 /// to -n_units at opposite ends. A readout of these codes learns trends over the whole range at
@@ -34,8 +34,9 @@ class Thermometers {
     return static_cast<std::size_t>(n_codes) * static_cast<std::size_t>(n_units_);
   }
 
-  /// Writes the codes. A bin beyond the others stands for a missing reading: its code is 0. Shapes:
-  /// bins (l,), signs (n_columns,). Returns how many columns are not 0.
+  /// Writes the codes of all inputs one after the other, and returns how many columns are not 0. A
+  /// bin of n_bins[i] or more stands for a missing reading: its code is 0. Shapes: bins (l,), signs
+  /// (n_columns,).
   std::size_t write(std::span<const coding::Bin> bins, std::int8_t* signs) const noexcept {
     std::size_t n_active = 0;
     for (std::size_t i = 0; i < n_bins_.size(); ++i) {
@@ -44,7 +45,8 @@ class Thermometers {
       signs = std::fill_n(signs, n_units_, 0);
       if (bins[i] >= n_bins) continue;
       const coding::Bin last = std::max(n_bins - 1, 1);
-      // The number of units above: n_units * bin / last, rounded to the nearest integer.
+      // The number of thresholds below the input: n_units * bin / last, rounded to the nearest
+      // integer.
       const std::int64_t twice_above = std::int64_t{2} * bins[i] * n_units_ + last;
       const auto n_above = static_cast<coding::Bin>(twice_above / (std::int64_t{2} * last));
       std::fill_n(signs - n_units_, n_above, 1);

@@ -20,19 +20,23 @@ namespace sdnn::approximators {
 ///
 /// After n corrections the weights after correction t have a weight of about (t / n)^7: the average
 /// forgets early weights and smooths late oscillations. A unit then has the sign of the mean of its
-/// recent potentials. A snapshot is taken every `interval` corrections, later every n / 64. It
-/// moves the average by 2^-k of the way to the weights, with the k for which that is about 8 / n
-/// times the corrections since the last. All numbers are integers, so equal corrections give equal
-/// bits. Weights have two bytes, of which 14 bits are for fractions of the learning step, by which
-/// weights change, or fewer if a weight needs more bits for whole steps.
+/// recent potentials. A snapshot is taken every `interval` corrections, or every n / 64 if that is
+/// more. It moves the average by 2^-k of the way to the present weights; k is chosen such that 2^-k
+/// is about 8 d / n, d being the number of corrections since the last snapshot.
+///
+/// All numbers are integers, so equal corrections give equal bits. An averaged weight has 16 bits,
+/// of which 14 are a fraction of a lattice step, or fewer if a weight needs more bits for whole
+/// steps.
 ///
 /// Source: Polyak, B., Juditsky, A. (1992). Acceleration of stochastic approximation by averaging;
 /// Shamir, O., Zhang, T. (2013). Stochastic gradient descent for non-smooth optimization, section
 /// 4 (polynomial-decay averaging, with eta about 7).
 class WeightAverage {
  public:
-  static constexpr int kFractionBits = 14;  ///< of small weights, in the 15 bits beside the sign
+  static constexpr int kFractionBits = 14;  ///< of thresholds, and of weights while they are small
 
+  /// Makes an average without snapshots of a layer of this size; `interval` is the number of
+  /// corrections between the first snapshots.
   WeightAverage(const HiddenLayer& layer, int interval)
       : n_units_(layer.n_units()),
         n_columns_(layer.n_columns()),
@@ -41,6 +45,7 @@ class WeightAverage {
         weights_(layer.n_blocks() * n_columns_ * HiddenLayer::kBlockUnits),
         thresholds_(n_units_) {}
 
+  /// Returns the memory of an average.
   static constexpr double n_bytes(double n_units, double n_columns) noexcept {
     return n_units * (sizeof(std::int16_t) * n_columns + sizeof(std::int64_t));
   }
@@ -63,11 +68,12 @@ class WeightAverage {
     due_ = n_corrections + interval_;
   }
 
-  /// The average of a weight, in 2^-fraction_bits() steps, and of a threshold, in 2^-14 steps.
   int fraction_bits() const noexcept { return fraction_bits_; }
+  /// The average of a weight, in units of 2^-fraction_bits() lattice steps.
   std::int16_t weight(std::size_t unit, std::size_t column) const noexcept {
     return weights_[index(unit, column)];
   }
+  /// The average of a threshold, in units of 2^-14 lattice steps.
   std::int64_t threshold(std::size_t unit) const noexcept { return thresholds_[unit]; }
 
   /// Lists the members that are saved and restored; see core/state.hpp.
@@ -108,12 +114,12 @@ class WeightAverage {
   static_assert(HiddenLayer::kWeightLimit << kFewestFractionBits <= INT16_MAX);
   static constexpr std::int64_t kLargestThreshold = std::int64_t{1} << (30 + kFractionBits);
 
-  /// The negative logarithm (base 2) of the weight of a snapshot.
+  /// Returns the k of a snapshot after `n_corrections`, which moves the average by 2^-k of the way.
   int shift_at(std::uint64_t n_corrections) const noexcept {
     if (n_snapshots_ == 0) return 0;
     const std::uint64_t passed = std::max(interval_, n_corrections >> kLogSnapshots);
-    // The share of 8 * passed / n is 2^-shift: bit_width is the logarithm plus 1, and 8 is 2^3.
-    // Older libraries return another type, hence the cast.
+    // 2^-k is about 8 passed / n, so k is log2(n / passed) - 3, and bit_width is the logarithm plus
+    // 1. The cast is for older libraries, in which bit_width returns an unsigned number.
     return std::max(static_cast<int>(std::bit_width(n_corrections / passed)) - 1 - 3, 0);
   }
 
@@ -135,8 +141,9 @@ class WeightAverage {
     ++n_snapshots_;
   }
 
-  /// Moves the averages of a block's weights towards these. Returns false, and changes nothing, if
-  /// an average needs more bits.
+  /// Moves the averages of a block's weights for a column by 2^-shift of the way to `weights`;
+  /// `half` rounds to the nearest number. Returns false, and changes nothing, if an average would
+  /// need more than 16 bits.
   template <class Weights>
   bool move(std::int16_t* average, const Weights& weights, int shift, std::int32_t half) noexcept {
     Weights moved;
@@ -144,7 +151,7 @@ class WeightAverage {
     for (std::size_t i = 0; i < moved.size(); ++i) {
       const std::int32_t before = average[i];
       moved[i] = before + (((weights[i] << fraction_bits_) - before + half) >> shift);
-      excess |= moved[i] ^ static_cast<std::int16_t>(moved[i]);  // not 0 beyond 16 bits
+      excess |= moved[i] ^ static_cast<std::int16_t>(moved[i]);  // not 0 if it exceeds 16 bits
     }
     if (excess != 0) return false;
     for (std::size_t i = 0; i < moved.size(); ++i) {
@@ -153,7 +160,8 @@ class WeightAverage {
     return true;
   }
 
-  /// Moves a bit from the fractions to the whole steps, halves rounded up.
+  /// Gives up a bit of the fractions, so that averages of twice the size fit; halves are rounded
+  /// up.
   void halve() noexcept {
     --fraction_bits_;
     for (std::int16_t& weight : std::span(weights_.data(), weights_.size())) {
@@ -184,14 +192,13 @@ inline std::int64_t rounded_average(std::int64_t value, int bits) noexcept {
 
 }  // namespace detail
 
-/// The averages of a threshold, and of the weight of the unit of x_SD with these columns, whose
-/// magnitude is at most `limit`, so that sums of two are within a layer's range.
+/// Returns the average of a threshold, rounded to whole lattice steps.
 inline std::int32_t averaged_threshold(const WeightAverage& average, std::size_t unit) noexcept {
   return static_cast<std::int32_t>(
       detail::rounded_average(average.threshold(unit), WeightAverage::kFractionBits));
 }
-/// The averaged weight of a column of the unpaired code, from the one or two paired columns that it
-/// was stored in; rounded and clipped.
+/// Returns the average of the weight of a unit of x_SD, which has these columns of the paired code,
+/// rounded to whole lattice steps and clipped to +-limit; see paired_weight.
 inline std::int32_t averaged_weight(const WeightAverage& average, std::size_t unit,
                                     const PairedColumns& columns, std::int64_t limit) noexcept {
   std::int64_t weight = average.weight(unit, columns.first);
@@ -201,7 +208,7 @@ inline std::int32_t averaged_weight(const WeightAverage& average, std::size_t un
       limit));
 }
 
-/// A constant layer of averaged weights, and its log for caches.
+/// A layer of averaged weights, which is never corrected, and its empty log, as caches require one.
 struct AveragedLayer {
   /// Makes a layer of the averaged weights and thresholds, rounded to integers.
   AveragedLayer(const WeightAverage& average, const coding::StateCode& code, std::size_t n_units,

@@ -17,10 +17,11 @@ namespace sdnn::approximators {
 
 namespace detail {
 
-/// The body of count_windows: counts of firing units before each unit, whose differences are the
-/// windows' counts. Units are counted in groups of eight bytes of 0 and 1: multiplied by 0x01...01,
-/// they become their prefix sums, the last of which is the highest byte. The bytes are __restrict,
-/// because compilers vectorize the loops only without aliasing.
+/// Implements count_windows, below. It counts the firing units before each unit; a window's count
+/// is the difference of two such numbers. Units are counted in groups of eight, as bytes of 0
+/// and 1. The product of such a group, read as a little-endian number, and 0x0101010101010101 has
+/// in byte k the sum of bytes 0 to k: (1, 0, 1, ...) becomes (1, 1, 2, ...). The pointers are
+/// __restrict, because compilers vectorize the loops only without aliasing.
 SDNN_INLINE std::int32_t count_windows_body(std::span<const std::int32_t> potentials,
                                             std::size_t size, std::uint8_t* __restrict firing,
                                             std::int32_t* __restrict before_groups,
@@ -54,15 +55,15 @@ SDNN_INLINE std::int32_t count_windows_body(std::span<const std::int32_t> potent
 
 }  // namespace detail
 
-/// Counts the units that fire in every window of `size` units; returns the largest count. Shapes:
-/// potentials (n,), counts (n - size + 1,); scratch: firing (n,), before_groups (n / 8,), before (n
-/// + 1,).
+/// Counts the units that fire, those with a potential above 0, in every window of `size` adjacent
+/// units; returns the largest count. Shapes: potentials (n,), counts (n - size + 1,); scratch:
+/// firing (n,), before_groups (n / 8,), before (n + 1,).
 SDNN_KERNEL(std::int32_t, count_windows,
             (std::span<const std::int32_t> potentials, std::size_t size, std::uint8_t* firing,
              std::int32_t* before_groups, std::int32_t* before, std::int32_t* counts),
             (potentials, size, firing, before_groups, before, counts))
 
-/// The counts of the actions of a code, and buffers to compute them.
+/// The number of firing units in the window of each action, and buffers to count them.
 class WindowCounts {
  public:
   explicit WindowCounts(const coding::ActionCode& actions)

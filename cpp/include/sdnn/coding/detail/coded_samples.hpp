@@ -16,8 +16,8 @@
 
 namespace sdnn::coding {
 
-/// The codes of several samples, padded with zeros to a multiple of 4 words, the 256 bits of a
-/// vector register.
+/// The codes of several samples, each padded with zeros to a multiple of 4 words, the 256 bits of a
+/// vector register, as inner_product reads them fastest.
 class CodedSamples {
  public:
   /// Encodes samples. Shapes: bins (n_samples, n_inputs), checked before.
@@ -38,6 +38,7 @@ class CodedSamples {
     const std::uint64_t* const active = words_.data() + 2 * t * n_words_;
     return {active, active + n_words_};
   }
+  /// Returns the memory of the codes of `n_samples` samples.
   static std::uint64_t bytes(const SelectiveDesensitization& code,
                              std::uint64_t n_samples) noexcept {
     return 2 * sizeof(std::uint64_t) * padded_words(code) * n_samples;
@@ -73,7 +74,7 @@ inline void write_signs(const SelectiveDesensitization& code, std::span<const Bi
   }
 }
 
-/// Writes the inner products of the codes of samples with those of others.
+/// Writes the inner products of the codes of n samples with those of m other samples.
 ///
 /// Shapes: bins (n, n_inputs), others (m, n_inputs), products (n, m). Throws std::invalid_argument
 /// for bins out of range.

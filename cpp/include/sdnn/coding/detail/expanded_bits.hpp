@@ -15,8 +15,10 @@ SDNN_INLINE void expand_bits(std::uint32_t plus, std::uint32_t minus,
 #if SDNN_LANES
   using Bytes = core::IntegerRegister<std::int8_t>;
   typedef std::uint8_t Bits __attribute__((vector_size(32)));
-  // Entry k reads bit k % 8 of byte k / 8 of the bits. Shuffles move bytes within halves of 16
-  // bytes, so the upper half takes bytes 2 and 3 from its own copy of the bits.
+  // Byte k of the result depends on bit k, which is bit k % 8 of byte k / 8 of `bits`. The fastest
+  // shuffles move bytes only within a half of 16 bytes. So the register begins as eight copies of
+  // the four bytes: the lower half repeats its bytes 0 and 1, and the upper half repeats bytes 2
+  // and 3 of the copy that begins at byte 16. A comparison then makes 0 or -1 (all ones) of a bit.
   constexpr Bits kOwn = {1, 2, 4, 8, 16, 32, 64, 128, 1, 2, 4, 8, 16, 32, 64, 128,  //
                          1, 2, 4, 8, 16, 32, 64, 128, 1, 2, 4, 8, 16, 32, 64, 128};
   const auto all_ones_if_set = [&](std::uint32_t bits) SDNN_INLINE_LAMBDA {

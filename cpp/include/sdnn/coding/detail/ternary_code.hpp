@@ -33,7 +33,8 @@ struct TernaryCode {
 
 namespace detail {
 
-/// The contribution of the words [begin, end) to the inner product.
+/// Computes the inner product of the words [begin, end): the number of columns that are not 0 in
+/// both codes, minus twice the number of those whose signs differ.
 SDNN_INLINE std::int32_t inner_product_of_words(const TernaryCode& code, const TernaryCode& other,
                                                 std::size_t begin, std::size_t end) noexcept {
   std::int32_t both = 0;
@@ -57,7 +58,8 @@ inline std::int32_t inner_product_portable(const TernaryCode& code, const Ternar
   return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from));
 }
 
-/// Counts 256 bits at a time: a table in a register has the number of bits of each 4-bit part.
+/// Computes inner_product 256 bits at a time. A shuffle looks up the number of set bits of each 4
+/// bits, in a table of 16 bytes (in both halves of the register); these counts are added bytewise.
 [[SDNN_TARGET_AVX2]] inline std::int32_t inner_product_avx2(const TernaryCode& code,
                                                             const TernaryCode& other,
                                                             std::size_t n_words) {
@@ -66,6 +68,7 @@ inline std::int32_t inner_product_portable(const TernaryCode& code, const Ternar
                                           0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4);
   const __m256i low = _mm256_set1_epi8(15);
   const __m256i none = _mm256_setzero_si256();
+  // Adds the number of set bits of each byte of `bits` to the same byte of `bytes`.
   const auto add_counts = [&](__m256i bytes,
                               __m256i bits) __attribute__((always_inline, target("avx2,popcnt"))) {
     const __m256i first = _mm256_shuffle_epi8(counts, _mm256_and_si256(bits, low));
@@ -106,7 +109,7 @@ inline std::int32_t inner_product_portable(const TernaryCode& code, const Ternar
 
 #if SDNN_NEON_KERNELS
 
-/// Counts 128 bits at a time with the byte counts of NEON.
+/// Computes inner_product 128 bits at a time, with NEON's instruction that counts bits in bytes.
 inline std::int32_t inner_product_neon(const TernaryCode& code, const TernaryCode& other,
                                        std::size_t n_words) noexcept {
   constexpr std::size_t kMost = 2 * 4095;  // words whose counts, 16 at most, fit into 16 bits
@@ -141,12 +144,12 @@ inline std::int32_t inner_product_neon(const TernaryCode& code, const TernaryCod
 
 }  // namespace detail
 
-/// The inner product of two codes, fastest if n_words is a multiple of 4.
+/// Computes the inner product of two codes of n_words words, fastest if that is a multiple of 4.
 SDNN_DISPATCH(std::int32_t, inner_product,
               (const TernaryCode& code, const TernaryCode& other, std::size_t n_words),
               (code, other, n_words))
 
-/// Number of entries of a code that are not 0.
+/// Counts the entries of a code that are not 0.
 inline std::size_t n_active(const TernaryCode& code, std::size_t n_words) noexcept {
   std::size_t n = 0;
   for (std::size_t w = 0; w < n_words; ++w) {
@@ -157,8 +160,8 @@ inline std::size_t n_active(const TernaryCode& code, std::size_t n_words) noexce
 
 namespace detail {
 
-/// The bits of a word of the columns that rise or fall from one code to another, and, as `again`,
-/// of those that do so by 2.
+/// The changes of 64 columns from one code to another, as bits: `up` and `down` have the columns
+/// whose entry rises or falls, `up_again` and `down_again` those among them that change by 2.
 struct WordChanges {
   SDNN_INLINE WordChanges(const TernaryCode& from, const TernaryCode& to,
                           std::size_t word) noexcept {
@@ -175,8 +178,9 @@ struct WordChanges {
   std::uint64_t up, up_again, down, down_again;
 };
 
-/// Writes `base` + the numbers of the set bits; returns their end. It writes `Some` numbers at a
-/// time, which avoids a jump if there are few bits; up to `Some` extra numbers may follow the end.
+/// Writes `base` + the numbers of the set bits, in rising order; returns the end of the written
+/// numbers. `Some` numbers are written before each test for further bits, so that few bits need few
+/// jumps; up to `Some` meaningless numbers may follow the end.
 template <std::size_t Some, class Number>
 SDNN_INLINE Number* append_few_bits(Number* to, std::uint64_t bits, std::size_t base) noexcept {
   Number* const end = to + std::popcount(bits);
@@ -189,7 +193,7 @@ SDNN_INLINE Number* append_few_bits(Number* to, std::uint64_t bits, std::size_t 
   return end;
 }
 
-/// The set bits of a byte, in rising order.
+/// The numbers of the `n` set bits of a byte, in rising order.
 struct BitsOfByte {
   std::array<std::uint32_t, 8> numbers{};
   std::uint32_t n = 0;
@@ -205,9 +209,9 @@ inline constexpr std::array<BitsOfByte, 256> kBitsOfByte = [] {
   return table;
 }();
 
-/// Like append_few_bits, for words with about a quarter of their bits set. It writes eight numbers
-/// for each byte, so that no branch depends on the bits; up to eight extra numbers may follow the
-/// end.
+/// Writes the same numbers as append_few_bits, faster for words with about a quarter of their bits
+/// set. It writes eight numbers for each byte, so that no branch depends on single bits; up to
+/// eight meaningless numbers may follow the end.
 inline std::uint32_t* append_many_bits(std::uint32_t* to, std::uint64_t bits,
                                        std::size_t base) noexcept {
   for (; bits != 0; bits >>= 8, base += 8) {
@@ -220,7 +224,7 @@ inline std::uint32_t* append_many_bits(std::uint32_t* to, std::uint64_t bits,
   return to;
 }
 
-/// The function list_columns below without vector instructions.
+/// Implements list_columns, below, without vector instructions.
 inline void list_columns_portable(const TernaryCode& code,
                                   std::span<const std::uint32_t> first_columns,
                                   std::uint32_t** plus, std::uint32_t** minus) noexcept {
@@ -238,8 +242,8 @@ inline void list_columns_avx2(const TernaryCode& code, std::span<const std::uint
   list_columns_portable(code, first_columns, plus, minus);
 }
 
-/// Lists sixteen columns at a time: those whose bit is set are moved together, and all sixteen
-/// written.
+/// Implements list_columns sixteen columns at a time: those whose bit is set are moved to the front
+/// of a register, which is written whole.
 [[SDNN_TARGET_AVX512]] inline void list_columns_avx512(const TernaryCode& code,
                                                        std::span<const std::uint32_t> first_columns,
                                                        std::uint32_t** plus,
@@ -271,7 +275,8 @@ inline void list_columns_avx2(const TernaryCode& code, std::span<const std::uint
 
 #endif  // SDNN_X86_KERNELS
 
-/// Lists the words that differ, without a branch for each, and then the columns in these words.
+/// Implements list_changes. It first lists the words in which the codes differ, without a branch
+/// for each word, and then the columns in these words.
 SDNN_INLINE void list_changes_body(const TernaryCode& from, const TernaryCode& to,
                                    std::span<const std::uint32_t> first_columns,
                                    std::uint32_t* words, std::uint32_t** up,
@@ -297,24 +302,26 @@ SDNN_KERNEL_NEON(void, list_columns,
                   std::uint32_t** plus, std::uint32_t** minus),
                  (code, first_columns, plus, minus))
 
-/// Appends to `plus` and `minus` the columns that are +1 and -1; `first_columns` has the number of
-/// each word's bit 0. Up to sixteen extra numbers are written.
+/// Writes the numbers of the columns that are +1 and -1 from `*plus` and `*minus` on, and moves
+/// both pointers to the ends. `first_columns` has, for each word, the number of the column of its
+/// bit 0. Up to sixteen meaningless numbers may follow each end.
 SDNN_DISPATCH(void, list_columns,
               (const TernaryCode& code, std::span<const std::uint32_t> first_columns,
                std::uint32_t** plus, std::uint32_t** minus),
               (code, first_columns, plus, minus))
 
-/// Appends to `up` and `down` the columns whose entry rises or falls from one code to another,
-/// twice if by 2: up to 128 for each word, and one extra. `first_columns` has the number of each
-/// word's bit 0; `words` is scratch for one number more than words.
+/// Writes the numbers of the columns whose entry rises or falls from one code to another from `*up`
+/// and `*down` on, twice for a change by 2, and moves both pointers to the ends: up to 128 numbers
+/// for each word, and a meaningless one behind. `first_columns` has, for each word, the number of
+/// the column of its bit 0; `words` is scratch for n_words + 1 numbers.
 SDNN_KERNEL(void, list_changes,
             (const TernaryCode& from, const TernaryCode& to,
              std::span<const std::uint32_t> first_columns, std::uint32_t* words, std::uint32_t** up,
              std::uint32_t** down),
             (from, to, first_columns, words, up, down))
 
-/// Columns to add and columns to subtract, each in rising order except for columns that are listed
-/// twice.
+/// The numbers of columns to add and of columns to subtract. A column that is listed twice counts
+/// twice; apart from that, numbers rise.
 struct SignedColumns {
   std::span<const std::uint32_t> plus;
   std::span<const std::uint32_t> minus;

@@ -17,11 +17,11 @@
 
 namespace sdnn::environments {
 
-/// The state after a time `step` of y' = derivative(y), given the slope at the start.
+/// Returns the state after a time `step` of y' = derivative(y), given the slope at the start.
 ///
-/// `Real` is double or core::Lanes; the derivative has to be inlined for wide lanes. The slope at
-/// the start is an argument, because a caller that uses every state has already computed most of
-/// it. The error of a step is O(step^5). It allocates nothing.
+/// `Real` is double or core::Lanes, a register of doubles; the derivative must be inlined for wide
+/// registers. The slope at the start is an argument, because a caller that tests every state has
+/// computed most of it already. The error of a step is O(step^5). It allocates nothing.
 /// Source: Kutta 1901; the weights are 1/6, 1/3, 1/3, 1/6.
 template <class Real, std::size_t Size, class Derivative>
 SDNN_INLINE std::array<Real, Size> runge_kutta_step(const Derivative& derivative,
@@ -52,7 +52,7 @@ template <class Real>
 struct AcrobotAngles {
   Real sin_1, cos_1, sin_2, cos_2, sin_12, cos_12;
 
-  /// Sines and cosines of both angles and, by the addition theorems, of their sum.
+  /// Adds those of the sum by the addition theorems.
   SDNN_INLINE static AcrobotAngles of(const core::BasicSinCos<Real>& joint_1,
                                       const core::BasicSinCos<Real>& joint_2) noexcept {
     return {joint_1.sin,
@@ -64,8 +64,9 @@ struct AcrobotAngles {
   }
 };
 
-/// The state as four numbers theta1, theta2 (rad), theta1_dot, theta2_dot (rad/s): of one acrobot
-/// (`Real` = double), or of one acrobot in each lane.
+/// The state as four numbers theta1, theta2 (rad), theta1_dot, theta2_dot (rad/s): of a single
+/// acrobot
+/// (`Real` = double), or of several, one in each lane of four registers.
 ///
 /// This is an array and not an Eigen vector, because Eigen does not support lanes as numbers, nor
 /// guarantees that its calls are inlined into a kernel for one instruction set.
@@ -86,8 +87,9 @@ struct SeparateForm {
 };
 
 #if SDNN_LANES
-/// The state of an acrobot as a pair of angles and a pair of velocities. Every machine has a
-/// register of two lanes, which halves the work on the sines.
+/// The state of a single acrobot as a register of two angles and a register of two velocities, so
+/// that the sines of both angles are computed at once. Registers of two lanes exist on every
+/// machine.
 struct PairedForm {
   using Number = double;
   using State = std::array<core::Lanes<2>, 2>;
@@ -105,12 +107,12 @@ struct PairedForm {
 };
 #endif
 
-/// The constants of the equations of motion, and one decision interval of them.
+/// The equations of motion of an acrobot, and their integration over a decision interval.
 ///
-/// theta1 = 0 hangs down, theta2 is relative to link 1; torque acts on joint 2 alone. Every form
-/// and every lane gives equal bits.
-/// Source: Spong, M. W. (1995). The swing up control problem for the acrobot. IEEE Control Systems
-/// 15(1), 49-55, with m2 l1 lc2 theta1_dot^2 sin theta2 in the second equation.
+/// theta1 = 0 hangs down, theta2 is relative to link 1; torque acts on joint 2 alone. `Form`,
+/// SeparateForm or PairedForm, is how states are stored; every form and every lane gives equal
+/// bits. Source: Spong, M. W. (1995). The swing up control problem for the acrobot. IEEE Control
+/// Systems 15(1), 49-55, with m2 l1 lc2 theta1_dot^2 sin theta2 in the second equation.
 class AcrobotDynamics {
  public:
   /// The largest number of integration steps in a decision.
@@ -131,11 +133,12 @@ class AcrobotDynamics {
     gravity_2_ = config.gravity * config.link_mass_2 * config.center_of_mass_2;
   }
 
-  /// Time derivative of `state` under `torque` (N m), given the sines and cosines of its angles.
+  /// Returns the time derivative of `state` under `torque` (N m), given the sines and cosines of
+  /// its angles.
   ///
-  /// Spong's d11 a1 + d12 a2 + h1 + phi1 = 0, d12 a1 + d22 a2 + h2 + phi2 = torque by Cramer's
-  /// rule. The determinant depends on theta2 alone, so its division overlaps with the right-hand
-  /// sides.
+  /// Spong's equations d11 a1 + d12 a2 + h1 + phi1 = 0 and d12 a1 + d22 a2 + h2 + phi2 = torque are
+  /// solved for the accelerations a1 and a2 by Cramer's rule. The determinant depends on theta2
+  /// alone, so the processor can divide by it while it computes the right-hand sides.
   template <class Form>
   SDNN_INLINE typename Form::State derivative(const typename Form::State& state,
                                               const AcrobotAngles<typename Form::Number>& at,
@@ -159,10 +162,11 @@ class AcrobotDynamics {
     return -config_.link_length_1 * at.cos_1 - config_.link_length_2 * at.cos_12;
   }
 
-  /// Advances `state` by one decision interval, or to the goal, where the mask `moving` is set.
+  /// Advances the states whose mask `moving` is set by one decision interval, or until they reach
+  /// the goal; the others do not change. Returns the mask of those that have reached the goal.
   ///
-  /// `limit_1` and `limit_2` are the goal's limits of speed (rad/s). Returns where the goal was
-  /// reached. Angles are not wrapped.
+  /// `limit_1` and `limit_2` are the goal's limits of speed (rad/s). Angles are not wrapped. For a
+  /// single acrobot a mask is a bool.
   template <class Form, class Mask>
   SDNN_INLINE Mask integrate(typename Form::State& state, const typename Form::Number& torque,
                              const typename Form::Number& limit_1,

@@ -1,4 +1,4 @@
-/// The kernel of a batch of acrobots, which move in the widest lanes of the processor.
+/// The kernel of a batch of acrobots, which move in the widest registers of the processor.
 #pragma once
 
 #include <array>
@@ -20,14 +20,14 @@ struct AcrobotArrays {
   std::uint64_t* mask;  ///< in: all ones where an acrobot moves; out: where it reached the goal
 };
 
-/// The number of doubles in the widest register.
+/// The number of doubles in the widest register of any processor.
 inline constexpr std::size_t kAcrobotLanes = 8;
 
 namespace detail {
 
 #if SDNN_LANES
-/// Moves acrobots until the next decision, Size of them at once in registers of doubles; to be
-/// inlined where the instruction set is known.
+/// Implements move_acrobots with Size acrobots at once, in registers of Size doubles. It is inlined
+/// into a function for an instruction set with such registers.
 template <std::size_t Size>
 SDNN_INLINE void move_in_lanes(const AcrobotDynamics& dynamics, const AcrobotArrays& arrays,
                                std::size_t n) noexcept {
@@ -50,7 +50,7 @@ SDNN_INLINE void move_in_lanes(const AcrobotDynamics& dynamics, const AcrobotArr
   }
 }
 #else
-/// Moves one acrobot after the other, in builds without vector registers.
+/// Implements move_acrobots one acrobot after the other, in builds without vector registers.
 template <std::size_t Size>
 void move_in_lanes(const AcrobotDynamics& dynamics, const AcrobotArrays& arrays,
                    std::size_t n) noexcept {
@@ -71,7 +71,7 @@ void move_in_lanes(const AcrobotDynamics& dynamics, const AcrobotArrays& arrays,
 
 }  // namespace detail
 
-// Two doubles are the baseline of x86-64 and AArch64.
+// Registers of two doubles exist on every x86-64 and AArch64 processor.
 SDNN_KERNEL_VERSION(, void, move_acrobots_portable,
                     (const AcrobotDynamics& dynamics, const AcrobotArrays& arrays, std::size_t n),
                     move_in_lanes<2>(dynamics, arrays, n))
@@ -87,7 +87,8 @@ SDNN_KERNEL_VERSION([[SDNN_TARGET_AVX512]], void, move_acrobots_avx512,
                     move_in_lanes<8>(dynamics, arrays, n))
 #endif
 
-/// Advances `n` acrobots by one decision interval or to the goal; angles are not wrapped.
+/// Advances the `n` acrobots in arrays, a multiple of kAcrobotLanes, by one decision interval or to
+/// the goal, where their mask is set. Angles are not wrapped.
 SDNN_DISPATCH(void, move_acrobots,
               (const AcrobotDynamics& dynamics, const AcrobotArrays& arrays, std::size_t n),
               (dynamics, arrays, n))

@@ -28,16 +28,18 @@
 
 namespace sdnn::estimators {
 
-/// Presents samples in blocks.
+/// Training that computes the potentials of a block of samples in one pass over the weights.
 ///
-/// A pass over the weights, a few cache-resident columns of some units at a time, sums the block's
-/// potentials, for each two inputs along a short walk through the codes of their pair. The effect
-/// of the block's corrections on its later potentials follows exactly from the inner products of
-/// its codes. The weights are corrected before the next pass, all corrections of a unit together.
-/// Weights have 16 bits, or 32 as soon as a sum of them could exceed 16.
+/// The pass takes a few columns of some units at a time, which stay in the cache. These columns
+/// belong to two inputs, and the samples are visited along a short walk through the bins of these
+/// inputs (see PairWalks). The effect of a correction on the potentials of later samples in the
+/// block follows exactly from the inner products of their codes (see PresentationWindow). The
+/// weights are corrected before the next pass, all corrections of a unit together. Weights have 16
+/// bits, or 32 as soon as a sum of them could exceed 16 bits.
 ///
-/// Blocks are large if they are repeated in every epoch, each in the order of the data, and if
-/// there is memory for their constant parts. `Product` is an integer that holds every product.
+/// A block's walks and products depend on its samples alone. They are its *plan*, which is kept if
+/// there is memory for the plans of all samples, divided into large blocks in the order of the
+/// data. `Product` is an integer type that holds 1 plus any inner product of codes.
 template <class Product>
 class BlockTraining {
  public:
@@ -80,7 +82,7 @@ class BlockTraining {
     return count;
   }
 
-  /// The bytes beside the layer and the samples' bins; an estimate at most 1 % too low.
+  /// Returns the bytes beside the layer and the samples' bins; an estimate at most 1 % too low.
   static std::uint64_t bytes(std::size_t n_units, const coding::SelectiveDesensitization& code,
                              std::size_t n_samples, bool keeps_plans) noexcept {
     const std::uint64_t n_padded = core::round_up(n_units, kTileStep);
@@ -100,23 +102,25 @@ class BlockTraining {
            + (keeps_plans ? plan_bytes(n_samples) : 0);  // plans_
   }
 
+  /// Copies the weights back to the layer.
   void synchronize() {
     std::visit([&](const auto& weights) { weights.copy_to(layer_->tiles(), word_order_); },
                weights_);
   }
 
  private:
-  // The number of samples per pass over the weights, with and without stored plans. A larger block
-  // needs fewer passes, but computes more products of codes for each of its samples.
+  // The number of samples per pass over the weights, with and without kept plans. A larger block
+  // needs fewer passes, but more inner products for each of its samples, which a kept plan has
+  // already.
   static constexpr std::size_t kLargeBlock = 512;
   static constexpr std::size_t kSmallBlock = 256;
 
-  /// The words of a code, padded with zeros to whole chunks.
+  /// The number of words of a code, padded to whole chunks of kChunkWords.
   static std::size_t words_for(const coding::SelectiveDesensitization& code) noexcept {
     return core::round_up(code.n_words(), kChunkWords);
   }
 
-  /// The words of all chunks, then the padding of the last chunk.
+  /// The numbers of the words of all chunks in turn, then those of padding, up to `n_words`.
   static std::vector<std::size_t> order_of(std::span<const PairChunk> chunks, std::size_t n_words) {
     std::vector<std::size_t> order;
     for (const PairChunk& chunk : chunks) {
@@ -130,13 +134,14 @@ class BlockTraining {
   using Wide = ChunkedWeights<std::int32_t>;
   static constexpr std::int64_t kLargestSum = std::numeric_limits<std::int16_t>::max();
 
-  /// The constant parts of a block.
+  /// The parts of a block that depend on its samples alone, and not on weights.
   struct Plan {
-    std::vector<CodeWalk> walks;            // walks by chunk
+    std::vector<CodeWalk> walks;            // a walk for each chunk
     std::size_t stride = 0;                 // entries between the beginnings of rows of products
-    core::AlignedBuffer<Product> products;  // (size, stride), 1 added to each
+    core::AlignedBuffer<Product> products;  // (size, stride): 1 plus the inner product of two codes
   };
 
+  /// The number of the large block that has a sample.
   static std::size_t block_of(std::int32_t sample) noexcept {
     return static_cast<std::size_t>(sample) / kLargeBlock;
   }
@@ -157,7 +162,7 @@ class BlockTraining {
     return true;
   }
 
-  /// Presents a block of samples; makes their plan if it is empty.
+  /// Presents a block of samples. An empty `plan` is filled first.
   template <class Rule>
   TrainingCount present_block(std::span<const std::int32_t> samples, Plan* plan, Rule& rule) {
     encode(samples);
@@ -173,7 +178,7 @@ class BlockTraining {
     return count;
   }
 
-  /// The code of the b-th sample of the current block.
+  /// The code of the sample at position b of the current block.
   coding::TernaryCode code_of(std::size_t b) const noexcept {
     const std::uint64_t* const active = words_.data() + 2 * b * n_words_;
     return {active, active + n_words_};
@@ -226,7 +231,8 @@ class BlockTraining {
     transpose(potentials_.data(), n_padded, n_samples, n_padded, window_.row(0), window_.stride());
   }
 
-  /// Adds the weights of a block's codes to the potentials, whose units the threads divide.
+  /// Adds the products of weights and a block's codes to the potentials. Each thread takes some of
+  /// the units.
   template <class Weight>
   void add_walks(const ChunkedWeights<Weight>& weights, std::size_t n_samples,
                  std::span<const CodeWalk> walks) {
@@ -270,8 +276,9 @@ class BlockTraining {
     for (auto& rows : pending_) rows.clear();
   }
 
-  /// Widens the weights to 32 bits if the coming corrections could let a sum overflow 16 bits: each
-  /// adds at most 1 to a weight, so at most kChunkColumns to a unit's sum in a chunk.
+  /// Widens the weights to 32 bits if the pending corrections could make a sum exceed 16 bits. Each
+  /// changes a weight by at most 1, so a unit's sum in a chunk by at most kChunkColumns. The stored
+  /// bound is replaced by the true maximum before that is decided.
   void widen_before_sums_overflow() {
     const auto* const narrow = std::get_if<Narrow>(&weights_);
     if (narrow == nullptr) return;
@@ -296,12 +303,14 @@ class BlockTraining {
   core::WorkerTeam team_;
   std::size_t most_samples_;
   bool keeps_plans_;
-  std::vector<Plan> plans_;                   // plans of large blocks
-  std::vector<std::uint64_t> words_;          // (most_samples, active then positive, n_words)
-  core::AlignedBuffer<std::int8_t> entries_;  // (chunks, most_samples, kChunkColumns): +1, 0, -1
+  std::vector<Plan> plans_;           // plans of large blocks
+  std::vector<std::uint64_t> words_;  // (most_samples, active then positive, n_words)
+  core::AlignedBuffer<std::int8_t>
+      entries_;  // (chunks, most_samples, kChunkColumns), each +1, 0 or -1
   core::AlignedBuffer<std::int32_t> potentials_;  // (most_samples, n_padded_units)
   PresentationWindow window_;
-  std::vector<SignedRows<std::int8_t>> pending_;  // codes not yet added to the weights, by unit
+  std::vector<SignedRows<std::int8_t>>
+      pending_;  // for each unit, codes not yet added to its weights
   std::variant<Narrow, Wide> weights_;
   std::int64_t chunk_norm_;  // bound of the sum of a unit's |weights| in a chunk, for 16 bits
 };

@@ -1,5 +1,6 @@
-/// Potentials of many samples along a short walk, each computed from the previous sample, and the
-/// weights in the order of such a walk.
+/// Sums of weights over the codes of many samples, each computed from the sum of the sample before
+/// it in an order with small changes, a *walk*; and the weights in chunks of columns for such
+/// walks.
 #pragma once
 
 #include <algorithm>
@@ -18,19 +19,20 @@
 
 namespace sdnn::estimators {
 
-/// The number of words of a code whose rows of weights are added together: 256 columns of 96 units
-/// in 16 bits fit into the first-level cache.
+/// The number of words of a code in a chunk, whose columns are added together: the weights of 96
+/// units in 256 columns, with 16 bits each, fit into the first-level cache.
 inline constexpr std::size_t kChunkWords = 4;
 inline constexpr std::size_t kChunkColumns = 64 * kChunkWords;
 
-/// The weights of many units in chunks of columns, and in each chunk by units: n_padded_units units
-/// and 64 slots for each word. Slots of words that tiles lack are 0.
+/// The weights of many units in chunks of kChunkColumns columns; a chunk has the weights of one
+/// unit after those of the other. Columns of words that a layer's tiles do not have are 0.
 template <class Weight>
 class ChunkedWeights {
  public:
-  /// The numbers of the words in the order of the chunks, a multiple of kChunkWords.
+  /// The numbers of the words of a code in the order of the chunks; a multiple of kChunkWords.
   using Words = std::vector<std::size_t>;
 
+  /// Copies the weights of a layer, word after word in the order of `words`.
   ChunkedWeights(const WeightTiles<std::int32_t>& tiles, const Words& words)
       : ChunkedWeights(tiles.n_padded_units(), words.size()) {
     for_each_slot(tiles, words, [&](std::size_t unit, std::size_t slot, std::size_t at) {
@@ -60,6 +62,7 @@ class ChunkedWeights {
     return weights_.data() + (chunk * n_padded_units_ + unit) * kChunkColumns;
   }
 
+  /// Copies the weights back to the tiles; `words` as in the constructor.
   void copy_to(WeightTiles<std::int32_t>& tiles, const Words& words) const {
     for_each_slot(tiles, words, [&](std::size_t unit, std::size_t slot, std::size_t at) {
       tiles.at(unit, slot) = weights_[at];
@@ -104,25 +107,26 @@ class ChunkedWeights {
   core::AlignedBuffer<Weight> weights_;  // (n_chunks, n_padded_units, kChunkColumns)
 };
 
-/// The number of units that are added together, in six registers.
+/// The largest number of units whose weights are added together: they take six registers.
 template <class Weight>
 inline constexpr std::size_t kMostUnits = 6 * core::IntegerRegister<Weight>::kSize;
 
-/// The kChunkWords words of a code, as bits of the columns that are not 0 and that are +1.
+/// The part of a code in a chunk, as bits of the columns that are not 0 and of those that are +1.
 struct ChunkCode {
   std::uint64_t active[kChunkWords];
   std::uint64_t positive[kChunkWords];
 };
 
-/// The codes of samples in a chunk: the different codes along a walk, and the code of each sample.
+/// A walk through the codes of samples in a chunk: the changes from each code to the next different
+/// one, and the step that leads to the code of each sample.
 struct CodeWalk {
-  /// The change from the previous code, or from the code of zeros: columns that rise, then columns
-  /// that fall.
+  /// The numbers of columns that rise and that fall, from the previous code or, if `from_zero`,
+  /// from the code of zeros.
   struct Step {
     std::uint16_t n_rising, n_falling;
     bool from_zero;
   };
-  std::vector<std::uint8_t> columns;  ///< columns of all steps
+  std::vector<std::uint8_t> columns;  ///< for each step, the rising and then the falling columns
   std::vector<Step> steps;
   std::vector<std::uint16_t> step_of_sample;  ///< the step that leads to the code of each sample
 
@@ -137,8 +141,7 @@ struct CodeWalk {
 
 namespace detail {
 
-/// Lists the columns that change from code to code; see list_steps below. Each code starts from the
-/// previous one or from zero, whichever differs in fewer columns.
+/// Implements list_steps, below.
 SDNN_INLINE std::uint8_t* list_steps_body(std::span<const ChunkCode> codes, std::size_t n_words,
                                           std::uint8_t* at, CodeWalk::Step* steps) noexcept {
   ChunkCode last{};
@@ -172,7 +175,7 @@ SDNN_INLINE std::uint8_t* list_steps_body(std::span<const ChunkCode> codes, std:
   return at;
 }
 
-/// Sums rows of weights along a walk, by its changes; see sum_steps below.
+/// Implements sum_steps, below.
 template <class Weight>
 SDNN_INLINE void sum_steps_body(const Weight* rows, std::size_t width, const CodeWalk& walk,
                                 Weight* sums) noexcept {
@@ -206,16 +209,16 @@ SDNN_INLINE void sum_steps_body(const Weight* rows, std::size_t width, const Cod
 
 }  // namespace detail
 
-/// The sums of the steps of a walk, and the step of each sample.
+/// The sums of weights at the steps of a walk, and the step of each sample.
 template <class Weight>
 struct StepSums {
-  const Weight* sums;
-  const std::uint16_t* step_of_sample;
+  const Weight* sums;                   ///< (n_steps, width)
+  const std::uint16_t* step_of_sample;  ///< (n_samples,)
 };
 
 namespace detail {
 
-/// Adds the sums of all walks to each sample's potentials; see add_step_sums below.
+/// Implements add_step_sums, below.
 template <class Weight>
 SDNN_INLINE void add_step_sums_body(std::span<const StepSums<Weight>> walks, std::size_t width,
                                     std::size_t n_samples, std::int32_t* potentials,
@@ -239,19 +242,19 @@ SDNN_INLINE void add_step_sums_body(std::span<const StepSums<Weight>> walks, std
 
 }  // namespace detail
 
-/// Lists the changes from code to code, starting from the code of zeros for the first code and
-/// wherever that is nearer: columns that rise, twice if by 2, then columns that fall. Only the
-/// first `n_words` words of a code count. It writes at most 64 columns for each word and step, and
-/// 2 more at the end. Returns their end.
+/// Writes a step for each code, and from `at` on the columns of all steps: those that rise, then
+/// those that fall, twice for a change by 2. A step starts from the previous code, or from the code
+/// of zeros if that is nearer; the first always starts from zeros. Only the first `n_words` words
+/// of a code count. Returns the end of the columns: at most 64 for each word and step, and up to 2
+/// meaningless ones behind.
 SDNN_KERNEL(std::uint8_t*, list_steps,
             (std::span<const ChunkCode> codes, std::size_t n_words, std::uint8_t* at,
              CodeWalk::Step* steps),
             (codes, n_words, at, steps))
 
-/// Computes sums[s * width + i], the sum of the weights of unit i over the code of step s. A sum
-/// over a chunk must fit into Weight.
-///
-/// Shapes: rows (kChunkColumns, width).
+/// Computes sums[s * width + i], the product of the weights of unit i and the code of step s. The
+/// sum of a unit's |weights| in the chunk must fit into their type. Shapes: rows (kChunkColumns,
+/// width).
 SDNN_KERNEL(void, sum_steps,
             (const std::int16_t* rows, std::size_t width, const CodeWalk& walk, std::int16_t* sums),
             (rows, width, walk, sums))
@@ -259,8 +262,8 @@ SDNN_KERNEL(void, sum_steps,
             (const std::int32_t* rows, std::size_t width, const CodeWalk& walk, std::int32_t* sums),
             (rows, width, walk, sums))
 
-/// Adds to potentials[s * stride + i], i = 0 .. width - 1, the sums of sample s in all walks, whose
-/// total must fit into Weight.
+/// Adds to potentials[s * stride + i], i = 0 .. width - 1, the sums of sample s in all walks. Their
+/// total must fit into the type of the sums.
 SDNN_KERNEL(void, add_step_sums,
             (std::span<const StepSums<std::int16_t>> walks, std::size_t width,
              std::size_t n_samples, std::int32_t* potentials, std::size_t stride),

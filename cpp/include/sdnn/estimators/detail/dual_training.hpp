@@ -26,14 +26,14 @@
 
 namespace sdnn::estimators {
 
-/// Keeps the potentials of all units for all training samples, and the number of times that each
-/// sample was added to each unit; the weights are computed from these on demand.
+/// Training that keeps the potentials of all units for all samples, and how often each sample was
+/// added to each unit, its *coefficient*. The weights are computed from these on demand.
 ///
-/// Correcting a unit by x_SD(t) and its threshold by 1 moves its potential for sample s by
-/// <x_SD(t), x_SD(s)> + 1, so a correction adds one row of the table of these products. Samples are
-/// presented in windows: a correction changes the window's potentials immediately, and those of all
-/// samples later, together with other corrections of its unit. `Product` is an integer that holds
-/// every product.
+/// Correcting a unit by x_SD(t) and its threshold by 1 changes its potential for sample s by
+/// <x_SD(t), x_SD(s)> + 1, so a correction adds a row of the table of these products. Samples are
+/// presented in windows: a correction changes the potentials of its window immediately, and those
+/// of all samples later, together with other corrections of its unit. `Product` is an integer type
+/// that holds 1 plus any inner product of codes.
 template <class Product>
 class DualTraining {
  public:
@@ -65,8 +65,8 @@ class DualTraining {
   }
 
   /// Presents samples in order, a window at a time; the rule corrects the units after each of them.
-  /// `flush` adds the corrections that were delayed to all potentials, `synchronize` adds their
-  /// coefficients to the weights before these exceed 16 bits.
+  /// Delayed corrections are added to all potentials by `flush`, and coefficients are added to the
+  /// weights by `synchronize` before they exceed 16 bits.
   template <class Rule>
   TrainingCount present(std::span<const std::int32_t> order, Rule& rule) {
     TrainingCount count;
@@ -74,9 +74,8 @@ class DualTraining {
         std::adjacent_find(order.begin(), order.end(), [](auto sample, auto next) {
           return next != sample + 1;
         }) == order.end();
-    // A correction changes the potentials of all samples by a row of inner products. Samples in the
-    // order of the data are contiguous there, so that a window can add the delayed corrections for
-    // itself, and the others wait for several windows.
+    // For samples in the order of the data a window's potentials are contiguous, so that the window
+    // can cheaply add delayed corrections to them itself; then `flush` is needed less often.
     const std::size_t interval = in_data_order ? kFlushInterval : 1;
     for (std::size_t n_since_flush = 0; !order.empty(); n_since_flush += kWindow) {
       core::interruption_point();
@@ -93,7 +92,7 @@ class DualTraining {
     return count;
   }
 
-  /// The bytes beside the layer and the samples' bins; an estimate at most 1 % too low.
+  /// Returns the bytes beside the layer and the samples' bins; an estimate at most 1 % too low.
   static std::uint64_t bytes(std::size_t n_units, const coding::SelectiveDesensitization& code,
                              std::size_t n_samples) noexcept {
     const std::uint64_t n_padded = core::round_up(n_units, kTileStep);
@@ -106,8 +105,8 @@ class DualTraining {
            + sizeof(Product) * kWindow * kWindow;          // gathered_
   }
 
-  /// Adds the sum over samples of coefficient * x_SD to the weights, by tiles and 64 slots at a
-  /// time.
+  /// Adds the sum over samples of coefficient * x_SD to the weights, for a tile and 64 slots at a
+  /// time, subtracts the coefficients from the thresholds, and sets them to 0.
   void synchronize() {
     auto& tiles = layer_->tiles();
     const std::size_t n_padded = layer_->n_padded_units();
@@ -134,8 +133,8 @@ class DualTraining {
   }
 
  private:
-  /// Computes the products of the samples [begin, end) with themselves and all later samples; the
-  /// codes of these few samples stay in the cache.
+  /// Computes the products of the samples [begin, end) with themselves and all later samples, in
+  /// both halves of the symmetric table. The codes of these few samples stay in the cache.
   void fill_products(std::size_t begin, std::size_t end) {
     for (std::size_t s = begin; s < coded_.size(); ++s) {
       for (std::size_t t = begin; t < std::min(end, s + 1); ++t) {
@@ -147,8 +146,9 @@ class DualTraining {
     }
   }
 
-  /// Adds coefficient * x_SD of the samples to the 64 rows of a tile that belong to word w of
-  /// codes. Sums are kept in 16 bits while they fit.
+  /// Adds coefficient * x_SD of the samples to the 64 rows of a tile that belong to word w of the
+  /// codes. `samples` has numbers of samples and their largest |coefficient| in the tile, which
+  /// bounds the sums that are kept in 16 bits before they are added to `rows`.
   void add_samples(std::int32_t* rows, std::size_t width, std::size_t tile, std::size_t w,
                    const std::vector<std::pair<std::size_t, std::int32_t>>& samples) const {
     alignas(core::kCacheLine) std::array<std::int16_t, 64 * kTileUnits> sums{};
@@ -183,7 +183,7 @@ class DualTraining {
     for (auto& rows : pending_) rows.clear();
   }
 
-  /// Presents samples that are contiguous in memory.
+  /// Presents consecutive samples of the data.
   template <class Rule>
   TrainingCount present_row(std::span<const std::int32_t> samples, Rule& rule) {
     const auto begin = static_cast<std::size_t>(samples[0]);
@@ -227,15 +227,16 @@ class DualTraining {
         });
   }
 
-  /// The number of entries of a row, with room for a window from any sample: whole cache lines, of
-  /// 32 products in 16 bits.
+  /// The number of entries of a row, a multiple of 32 (a cache line of products in 16 bits), with
+  /// room for a padded window that begins at any sample.
   static constexpr std::size_t row_size_for(std::size_t n_samples) noexcept {
     return core::round_up(n_samples + PresentationWindow::kAtOnce - 1, 32);
   }
 
   static constexpr std::size_t kWindow = 128;                 // samples that are presented together
   static constexpr std::size_t kFlushInterval = 4 * kWindow;  // samples whose corrections may wait
-  /// A window can still change a coefficient by kWindow.
+  /// The |coefficient| from which another window, which may change it by kWindow, could exceed 16
+  /// bits.
   static constexpr int kFullCoefficient = std::numeric_limits<std::int16_t>::max() - int{kWindow};
   static constexpr std::size_t kRows = 8;       // samples whose codes stay in the cache
   static constexpr std::size_t kColumns = 256;  // samples whose products stay in the cache
@@ -245,9 +246,10 @@ class DualTraining {
   std::size_t row_size_;
   std::size_t n_per_sum_;  // products whose sum a Product holds
   core::WorkerTeam team_;
-  core::AlignedBuffer<Product> products_;         // (n_samples, row_size), 1 added to each
+  core::AlignedBuffer<Product> products_;         // (n_samples, row_size): 1 plus inner products
   core::AlignedBuffer<std::int32_t> potentials_;  // (n_units, row_size)
-  std::vector<SignedRows<Product>> pending_;      // corrections not yet in all potentials, by unit
+  std::vector<SignedRows<Product>>
+      pending_;  // for each unit, corrections not yet in all its potentials
   core::AlignedBuffer<std::int16_t> coefficients_;  // (n_samples, n_padded_units)
   PresentationWindow window_;
   core::AlignedBuffer<Product> gathered_;  // (kWindow, kWindow): products of scattered samples

@@ -1,9 +1,10 @@
-/// Potentials of a block of samples, computed by pairs of inputs.
+/// Potentials of a block of samples, summed by pairs of inputs.
 ///
-/// The potentials of a sample are those of the one before, corrected by the columns in which their
-/// codes differ, so consecutive samples should have similar codes. With many inputs no single order
-/// achieves that; but the columns of a pair depend on two inputs alone, so each pair has an order
-/// of its own, a short walk through the plane of these inputs.
+/// A sum of weights over a sample's code is that of the sample before, changed by the columns in
+/// which the two codes differ, so consecutive samples should have similar codes. With many inputs
+/// no single order achieves that. But the columns of a pair of inputs depend on two inputs alone.
+/// So each pair has a separate order of the samples, a short walk through the plane of the two
+/// inputs.
 #pragma once
 
 #include <algorithm>
@@ -27,7 +28,7 @@
 
 namespace sdnn::estimators {
 
-/// A part of a code, 1, 2 or kChunkWords words that depend on the same two inputs.
+/// A chunk of a code: 1, 2 or kChunkWords words that depend on the same two inputs.
 struct PairChunk {
   std::size_t input;
   std::size_t other_input;
@@ -58,8 +59,9 @@ inline std::vector<PairChunk> pair_chunks(const coding::SelectiveDesensitization
   return chunks;
 }
 
-/// An order of the samples for each two inputs, in which successive codes differ in few units: in
-/// strips of the same bin of one input, alternately up and down the bins of the other.
+/// Orders of the samples, for any two inputs, in which successive codes differ in few units: the
+/// bins of one input are divided into strips, and the walk passes strip after strip, alternately up
+/// and down the bins of the other input.
 class PairWalks {
  public:
   /// Sorts the samples by the bins of each input, from which any pair is ordered quickly. Shapes:
@@ -69,8 +71,10 @@ class PairWalks {
         inputs_(code.n_inputs()),
         order_(bins.size() / code.n_inputs()),
         columns_(kChunkColumns * order_.size() + 2) {  // list_steps may write 2 more
-    // With k strips of a unit square and n points the walk is about k + n / (3 k) long: along the
-    // strips and across them. It is shortest for k = sqrt(n / 3).
+    // With n points in a unit square and k strips, a walk is about k + n / (3 k) long: k along the
+    // strips, and 1 / (3 k), the mean distance of two points across a strip, for each point. It is
+    // shortest for k = sqrt(n / 3). Where that needs half as many strips as bins, each bin is a
+    // strip.
     const auto n_wide_strips = static_cast<std::size_t>(
         std::max(1.0, std::round(std::sqrt(static_cast<double>(order_.size()) / 3.0))));
     for (std::size_t i = 0; i < inputs_.size(); ++i) {
@@ -120,11 +124,12 @@ class PairWalks {
   }
 
  private:
+  /// An input's bins and strips of all samples, with the samples sorted by them.
   struct Input {
-    std::vector<std::int32_t> bins;
-    std::vector<std::uint32_t> strips;
-    std::vector<std::uint32_t> begins;  // beginnings of the strips in an order, and its end
-    std::vector<std::uint32_t> sorted;  // samples by bins
+    std::vector<std::int32_t> bins;     // by sample
+    std::vector<std::uint32_t> strips;  // by sample
+    std::vector<std::uint32_t> begins;  // where strips begin if samples are sorted by them; the end
+    std::vector<std::uint32_t> sorted;  // samples in the order of their bins
   };
 
   /// Orders the samples by strips of one input, and within these by the other input, upwards and
@@ -162,11 +167,11 @@ inline constexpr std::size_t kMostChunks = 4;
 /// The number of chunks whose walks are computed at a time, so that potentials stay in the caches.
 inline constexpr std::size_t kWalks = 32;
 
-/// Adds the contributions of chunks of columns to potentials, some chunks at a time.
+/// Buffers to add the contributions of chunks of columns to potentials, some chunks at a time.
 template <class Weight>
 class ChunkSums {
  public:
-  /// The sums over n_chunks chunks have to fit into Weight.
+  /// Makes buffers for up to n_chunks chunks at a time, whose total sum must fit into Weight.
   ChunkSums(std::size_t n_samples, std::size_t n_chunks)
       : n_samples_(n_samples),
         n_chunks_(std::min(n_chunks, kMostChunks)),
@@ -202,10 +207,11 @@ class ChunkSums {
   core::AlignedBuffer<Weight> sums_;  // (n_chunks, n_samples, width)
 };
 
-/// Adds the weights of each sample's code to its potentials in layers of equal size,
-/// potentials[(layer * n_samples + s) * n_padded_units + i].
+/// Adds to potentials[(layer * n_samples + s) * n_padded_units + i] the product of the weights of
+/// unit i in a layer and the code of sample s. All layers have one size.
 ///
-/// The sums over n_chunks chunks have to fit into Weight.
+/// The sum of a unit's |weights| over any n_chunks chunks must fit into Weight. Shapes: bins
+/// (n_samples, n_inputs).
 template <class Weight>
 void add_codes(const coding::SelectiveDesensitization& code,
                std::span<const WeightTiles<Weight>* const> layers, std::size_t n_chunks,

@@ -26,16 +26,17 @@ struct TrainingCount {
   }
 };
 
-/// The current potentials of all units for up to `capacity` samples, ordered by units; presenting a
-/// sample changes those of later samples by the inner products of the codes.
+/// The current potentials of all units for up to `capacity` samples. A correction by a sample
+/// changes the potentials of later samples by the inner products of the codes.
 ///
-/// A correction is applied to the next few samples individually, and to the others a row at a time.
+/// Samples are presented in groups of kAtOnce. A correction is applied to the later samples of its
+/// group one by one, and to all samples after the group at once, by a row of inner products.
 class PresentationWindow {
  public:
-  /// The number of samples whose potentials are read together; rows are padded to a multiple of it.
+  /// The number of samples in a group; rows are padded to a multiple of it.
   static constexpr std::size_t kAtOnce = 16;
 
-  /// `n_padded_units` is a multiple of 16.
+  /// Makes a window of up to `capacity` samples; `n_padded_units` is a multiple of 16.
   PresentationWindow(std::size_t n_padded_units, std::size_t capacity)
       : n_padded_units_(n_padded_units),
         stride_(core::round_up(capacity, kAtOnce) + kAtOnce),
@@ -90,7 +91,7 @@ class PresentationWindow {
 
  private:
   struct Recent {
-    std::size_t index;  // position in the window of the corrected sample
+    std::size_t index;  // position in the window of the sample that was learned
     Correction correction;
   };
 
@@ -99,7 +100,7 @@ class PresentationWindow {
   core::AlignedBuffer<std::int32_t> by_unit_;    // (n_padded_units, stride)
   core::AlignedBuffer<std::int32_t> by_sample_;  // (kAtOnce, n_padded_units)
   std::vector<Correction> corrections_;
-  std::vector<Recent> recent_;  // corrections applied to only the next few samples
+  std::vector<Recent> recent_;  // corrections in the current group, not yet applied after it
 };
 
 }  // namespace sdnn::estimators

@@ -15,10 +15,13 @@ namespace sdnn::estimators {
 
 namespace detail {
 
-/// The position of a point on a Hilbert curve through a cube with 2^n_bits points on each side.
+/// Returns the position of a point on a Hilbert curve through a cube with 2^n_bits points on each
+/// side. `axes` has the point's coordinates, and is overwritten. Requires axes.size() * n_bits
+/// <= 64.
 ///
-/// Source: Skilling 2004, "Programming the Hilbert curve". `axes` is scratch and is overwritten.
-/// Requires axes.size() * n_bits <= 64.
+/// Source: Skilling 2004, "Programming the Hilbert curve": from the highest bit down, the
+/// reflections and exchanges of axes in the sub-cubes are undone; then the bits are Gray decoded
+/// and interleaved.
 inline std::uint64_t hilbert_index(std::span<std::uint32_t> axes, int n_bits) noexcept {
   const std::size_t n = axes.size();
   const std::uint32_t top = std::uint32_t{1} << (n_bits - 1);
@@ -46,8 +49,8 @@ inline std::uint64_t hilbert_index(std::span<std::uint32_t> axes, int n_bits) no
   return index;
 }
 
-/// The length of a walk through the queries in bins; the step of each input counts as `cap` at
-/// most.
+/// Returns the length of a walk through the queries: the sum over steps and inputs of the
+/// difference of bins, each counted as `cap` at most.
 inline std::uint64_t walk_length(std::span<const std::int32_t> bins, std::size_t n_inputs,
                                  std::span<const std::uint32_t> order, std::int32_t cap) noexcept {
   std::uint64_t length = 0;
@@ -73,13 +76,15 @@ inline std::vector<std::uint32_t> query_order(std::span<const std::int32_t> bins
   std::vector<std::uint32_t> given_order(n_queries);
   std::iota(given_order.begin(), given_order.end(), std::uint32_t{0});
   const std::uint64_t given_length = detail::walk_length(bins, n_inputs, given_order, kCap);
-  // Up to 1.5 bins a step, as on a lattice, a curve would save little.
+  // With up to 1.5 bins a step, as for queries on a lattice, another order would save little.
   if (n_queries < 3 || given_length <= n_queries + n_queries / 2) return given_order;
 
   std::int32_t largest = 1;
   for (const std::int32_t bin : bins) largest = std::max(largest, bin);
   const auto n_bits = static_cast<int>(std::bit_width(static_cast<std::uint32_t>(largest)));
   const std::size_t n_axes = std::min<std::size_t>(n_inputs, 64);
+  // A position on the curve has 64 bits, so with many inputs only the highest bits of bins are
+  // kept.
   const int kept = std::min({n_bits, 31, static_cast<int>(64 / n_axes)});  // bins are below 2^31
   std::vector<std::pair<std::uint64_t, std::uint32_t>> keys(n_queries);
   std::vector<std::uint32_t> axes(n_axes);

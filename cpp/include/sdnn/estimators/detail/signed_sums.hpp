@@ -1,5 +1,5 @@
-/// Sums of rows minus sums of other rows, by which corrections change potentials and weights. Rows
-/// are inner products of codes, or codes.
+/// Sums of rows minus sums of other rows. Corrections change potentials by rows of inner products,
+/// and weights by codes.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +16,7 @@
 
 namespace sdnn::estimators {
 
-/// Rows to add and rows to subtract.
+/// Rows to add and rows to subtract, which must exist until they are used.
 template <class Entry>
 struct SignedRows {
   std::vector<const Entry*> plus;
@@ -35,7 +35,8 @@ struct SignedRows {
 
 namespace detail {
 
-/// Sums the entries of `Registers` registers at `at`, of the rows [p, p_end) and [m, m_end).
+/// Adds to `to`, for as many entries as `Registers` registers hold, the entries from `at` on of the
+/// rows plus[p .. p_end), minus those of the rows minus[m .. m_end). They are summed in type Entry.
 template <std::size_t Registers, class To, class Entry>
 SDNN_INLINE void add_signed_at(To* to, std::size_t at, const SignedRows<Entry>& rows, std::size_t p,
                                std::size_t p_end, std::size_t m, std::size_t m_end) noexcept {
@@ -56,8 +57,8 @@ SDNN_INLINE void add_signed_at(To* to, std::size_t at, const SignedRows<Entry>& 
                                 SDNN_INLINE_LAMBDA { sum[r].add_to(to + r * Register::kSize); });
 }
 
-/// Adds and subtracts rows, `n_per_sum` at a time; four registers, one register, then single
-/// entries.
+/// Implements add_signed, below, for `n_per_sum` rows at a time: first with four registers of
+/// entries, then with single registers, and at the end with single entries.
 template <class To, class Entry>
 SDNN_INLINE void add_signed_body(To* to, std::size_t size, const SignedRows<Entry>& rows,
                                  std::size_t offset, std::size_t n_per_sum) noexcept {
@@ -85,6 +86,7 @@ SDNN_INLINE void add_signed_body(To* to, std::size_t size, const SignedRows<Entr
   }
 }
 
+/// Implements add_row, below.
 template <class Product>
 SDNN_INLINE void add_row_body(std::int32_t* to, const Product* row, std::int32_t direction,
                               std::size_t size) noexcept {
@@ -95,7 +97,7 @@ SDNN_INLINE void add_row_body(std::int32_t* to, const Product* row, std::int32_t
   }
 }
 
-/// Writes the entries of a code as bytes, in chunks of words; see expand_code below.
+/// Implements expand_code, below.
 SDNN_INLINE void expand_code_body(const coding::TernaryCode& code,
                                   std::span<const std::size_t> words, std::size_t chunk_words,
                                   std::int8_t* entries, std::size_t chunk_stride) noexcept {
@@ -110,10 +112,11 @@ SDNN_INLINE void expand_code_body(const coding::TernaryCode& code,
 
 }  // namespace detail
 
-/// Adds to to[i] the sum of row[offset + i] over the rows to add, minus that over the rows to
-/// subtract.
+/// Adds to to[i], i < size, the sum of row[offset + i] over the rows to add, minus that over the
+/// rows to subtract.
 ///
-/// At most `n_per_sum` (> 0) entries are added in their own type before their sum is widened.
+/// At most `n_per_sum` (> 0) entries are added in their own type, which must hold the sum, before
+/// it is added to `to`.
 SDNN_KERNEL(void, add_signed,
             (std::int16_t* to, std::size_t size, const SignedRows<std::int8_t>& rows,
              std::size_t offset, std::size_t n_per_sum),
@@ -131,7 +134,7 @@ SDNN_KERNEL(void, add_signed,
              std::size_t offset, std::size_t n_per_sum),
             (to, size, rows, offset, n_per_sum))
 
-/// Adds direction (+1 or -1) * row[i] to to[i].
+/// Adds direction (+1 or -1) * row[i] to to[i], i < size.
 SDNN_KERNEL(void, add_row,
             (std::int32_t* to, const std::int16_t* row, std::int32_t direction, std::size_t size),
             (to, row, direction, size))
@@ -139,8 +142,9 @@ SDNN_KERNEL(void, add_row,
             (std::int32_t* to, const std::int32_t* row, std::int32_t direction, std::size_t size),
             (to, row, direction, size))
 
-/// Writes words of a code as rows of `chunk_words` words: entries[c * chunk_stride + k] is +1, 0 or
-/// -1, for column k of chunk c. Their number is a multiple of `chunk_words`.
+/// Writes a code as bytes +1, 0 or -1, in chunks of `chunk_words` words: entries[c * chunk_stride +
+/// k] is column k of chunk c. `words` has the numbers of the code's words, chunk after chunk; their
+/// number is a multiple of `chunk_words`.
 SDNN_KERNEL(void, expand_code,
             (const coding::TernaryCode& code, std::span<const std::size_t> words,
              std::size_t chunk_words, std::int8_t* entries, std::size_t chunk_stride),

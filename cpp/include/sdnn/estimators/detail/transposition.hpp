@@ -20,13 +20,15 @@ using Shorts = core::IntegerRegister<std::int16_t>;
 using Words = core::IntegerRegister<std::int32_t>;
 using LongWords = core::IntegerRegister<std::int64_t>;
 
-/// Reinterprets 32 bytes as other integers.
+/// Reinterprets the 32 bytes of a register as integers of another size.
 template <class To, class From>
 SDNN_INLINE To as(const From& from) noexcept {
   return {(typename To::Vector)from.v};
 }
 
-// Interleaves the first (low) or last (high) halves of the 16-byte parts of two registers.
+// Vector instructions interleave within parts of 16 bytes. For registers a0 a1 a2 a3 | a4 a5 a6 a7
+// and b0 ... | b4 ..., low_turns takes the first half of each part, a0 b0 a1 b1 | a4 b4 a5 b5, and
+// high_turns the last half, a2 b2 a3 b3 | a6 b6 a7 b7.
 
 SDNN_INLINE Shorts low_turns(const Shorts& a, const Shorts& b) noexcept {
   return {
@@ -49,14 +51,17 @@ SDNN_INLINE LongWords high_turns(const LongWords& a, const LongWords& b) noexcep
   return {__builtin_shufflevector(a.v, b.v, 1, 5, 3, 7)};
 }
 
+/// Joins the first halves of two registers.
 SDNN_INLINE LongWords first_halves(const LongWords& a, const LongWords& b) noexcept {
   return {__builtin_shufflevector(a.v, b.v, 0, 1, 4, 5)};
 }
+/// Joins the last halves of two registers.
 SDNN_INLINE LongWords last_halves(const LongWords& a, const LongWords& b) noexcept {
   return {__builtin_shufflevector(a.v, b.v, 2, 3, 6, 7)};
 }
 
-/// Transposes 16 rows and 8 columns: two squares of 8 at once, one in each half of the registers.
+/// Transposes 16 rows and 8 columns of 16-bit integers: two squares of 8 at once, rows 0 to 7 in
+/// the first halves of the registers and rows 8 to 15 in the last.
 struct ShortBlock {
   static constexpr std::size_t kRows = 16;
   static constexpr std::size_t kColumns = 8;
@@ -70,8 +75,8 @@ struct ShortBlock {
       std::memcpy(halves, from + r * from_stride, 16);
       std::memcpy(halves + 16, from + (r + 8) * from_stride, 16);
     });
-    Words pairs[8];  // pairs of rows, then of pairs of rows
-    LongWords fours[8];
+    Words pairs[8];      // entries of two rows in turn
+    LongWords fours[8];  // entries of four rows in turn
     core::unrolled<4>([&](std::size_t k) SDNN_INLINE_LAMBDA {
       pairs[k] = as<Words>(low_turns(rows[2 * k], rows[2 * k + 1]));
       pairs[k + 4] = as<Words>(high_turns(rows[2 * k], rows[2 * k + 1]));
@@ -90,7 +95,7 @@ struct ShortBlock {
   }
 };
 
-/// Transposes 8 rows and 8 columns.
+/// Transposes 8 rows and 8 columns of 32-bit integers.
 struct WordBlock {
   static constexpr std::size_t kRows = 8;
   static constexpr std::size_t kColumns = 8;
@@ -120,6 +125,7 @@ struct WordBlock {
   }
 };
 
+// The block for a type of item; for decltype only.
 inline ShortBlock block_of(const std::int16_t*) noexcept { return {}; }
 inline WordBlock block_of(const std::int32_t*) noexcept { return {}; }
 
@@ -127,6 +133,8 @@ SDNN_WIDE_VECTORS_END
 
 #endif  // SDNN_LANES
 
+/// Implements transpose, below: whole blocks with vectors, and the other rows and columns item by
+/// item.
 template <class Item>
 SDNN_INLINE void transpose_body(const Item* from, std::size_t from_stride, std::size_t n_rows,
                                 std::size_t n_columns, Item* to, std::size_t to_stride) noexcept {

@@ -16,6 +16,7 @@ namespace detail {
 
 SDNN_WIDE_VECTORS_BEGIN
 
+/// Implements count_firing, below.
 SDNN_INLINE std::int32_t count_firing_body(const std::int32_t* potentials,
                                            std::size_t size) noexcept {
   std::int32_t count = 0;
@@ -23,7 +24,7 @@ SDNN_INLINE std::int32_t count_firing_body(const std::int32_t* potentials,
   return count;
 }
 
-/// Computes a key for each unit, whose order is by distance and then index; see rank_units below.
+/// Implements rank_units, below.
 SDNN_INLINE std::int32_t rank_units_body(const std::int32_t* potentials, std::size_t size,
                                          bool firing, int n_bits, std::int32_t limit,
                                          std::int32_t* keys) noexcept {
@@ -35,7 +36,9 @@ SDNN_INLINE std::int32_t rank_units_body(const std::int32_t* potentials, std::si
   constexpr std::size_t kSize = core::IntegerRegister<std::int32_t>::kSize;
   const Vector none = Vector{} + kNone;
   const Vector limits = Vector{} + limit;
-  const Vector flip = Vector{} - (firing ? 0 : 1);  // all ones to negate and to invert the mask
+  // With all ones, ^ flip inverts a mask, and (p ^ flip) - flip negates p; with zeros they do
+  // nothing.
+  const Vector flip = Vector{} - (firing ? 0 : 1);
   Vector lowest = none;
   Vector index{};
   for (std::size_t k = 0; k < kSize; ++k) index[k] = static_cast<std::int32_t>(k);
@@ -63,7 +66,7 @@ SDNN_INLINE std::int32_t rank_units_body(const std::int32_t* potentials, std::si
   return least;
 }
 
-/// The smallest value above `floor`, or INT32_MAX.
+/// Implements least_above, below.
 SDNN_INLINE std::int32_t least_above_body(const std::int32_t* values, std::size_t size,
                                           std::int32_t floor) noexcept {
   constexpr std::int32_t kNone = std::numeric_limits<std::int32_t>::max();
@@ -90,18 +93,19 @@ SDNN_WIDE_VECTORS_END
 
 }  // namespace detail
 
-/// The number of potentials above 0.
+/// Counts the potentials above 0.
 SDNN_KERNEL(std::int32_t, count_firing, (const std::int32_t* potentials, std::size_t size),
             (potentials, size))
 
-/// Sets keys[i] = (distance to the threshold) << n_bits | i for the units that fire (`firing`) or
-/// do not, and INT32_MAX for the others; distances are at most `limit`. Returns the smallest key.
+/// Sets keys that order units by their distance from the threshold and then by index: keys[i] =
+/// distance << n_bits | i for the units that fire (`firing`) or else for those that do not, and
+/// INT32_MAX for the others. Distances above `limit` count as `limit`. Returns the smallest key.
 SDNN_KERNEL(std::int32_t, rank_units,
             (const std::int32_t* potentials, std::size_t size, bool firing, int n_bits,
              std::int32_t limit, std::int32_t* keys),
             (potentials, size, firing, n_bits, limit, keys))
 
-/// The smallest value above `floor`, or INT32_MAX.
+/// Returns the smallest value above `floor`, or INT32_MAX if there is none.
 SDNN_KERNEL(std::int32_t, least_above,
             (const std::int32_t* values, std::size_t size, std::int32_t floor),
             (values, size, floor))

@@ -1,5 +1,5 @@
-/// The weights of many units in tiles, where a column of all units takes a few cache lines, and
-/// sums over columns.
+/// The weights of many units in tiles: in a tile, the weights of some units for a column are
+/// adjacent.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +21,7 @@ namespace sdnn::estimators {
 /// The width of a full tile: the number of units whose weights are adjacent. Their sums take six
 /// registers of 16-bit weights.
 inline constexpr std::size_t kTileUnits = 96;
-/// The factor of all widths of tiles: the number of 16-bit weights in a register.
+/// Widths of tiles are multiples of this number: a register holds so many 16-bit weights.
 inline constexpr std::size_t kTileStep = 16;
 
 namespace detail {
@@ -29,8 +29,8 @@ namespace detail {
 template <std::size_t Value>
 using Size = std::integral_constant<std::size_t, Value>;
 
-/// Calls function(Size<width>()), so that the width, a multiple of 16 up to Most, is a compile-time
-/// constant.
+/// Calls function(Size<width>()), so that the width, a multiple of kTileStep up to Most, is a
+/// compile-time constant.
 template <std::size_t Most, std::size_t Width = kTileStep, class Function>
 SDNN_INLINE void for_width(std::size_t width, const Function& function) noexcept {
   if constexpr (Width < Most) {
@@ -41,7 +41,8 @@ SDNN_INLINE void for_width(std::size_t width, const Function& function) noexcept
 
 using Slots = std::span<const std::uint32_t>;
 
-/// Adds and subtracts rows of a tile of constant width, `n_per_sum` at a time in its own type.
+/// Adds the rows `plus` of a tile of constant width to `sums`, and subtracts its rows `minus`;
+/// `n_per_sum` rows at a time are summed in type Weight.
 template <class Weight, std::size_t Width>
 SDNN_INLINE void add_rows_of_width(const Weight* tile, Slots plus, Slots minus,
                                    std::size_t n_per_sum, std::int32_t* sums) noexcept {
@@ -69,7 +70,7 @@ SDNN_INLINE void add_rows_of_width(const Weight* tile, Slots plus, Slots minus,
   }
 }
 
-/// Calls add_rows_of_width with the width as a constant, so that its loops are unrolled.
+/// Implements add_rows, below, with the width as a constant, so that loops are unrolled.
 template <class Weight>
 SDNN_INLINE void add_rows_body(const Weight* tile, std::size_t width, Slots plus, Slots minus,
                                std::size_t n_per_sum, std::int32_t* sums) noexcept {
@@ -78,7 +79,7 @@ SDNN_INLINE void add_rows_body(const Weight* tile, std::size_t width, Slots plus
   });
 }
 
-/// Adds the outer product of a word of a code and coefficients of units to 64 rows.
+/// Implements add_outer, below.
 SDNN_INLINE void add_outer_body(std::int16_t* rows, std::size_t width,
                                 const std::int16_t* coefficients, std::uint64_t active,
                                 std::uint64_t positive) noexcept {
@@ -110,15 +111,17 @@ SDNN_INLINE void add_outer_body(std::int16_t* rows, std::size_t width,
 
 }  // namespace detail
 
-/// Adds the coefficients to the rows of the set bits of `positive`, subtracts them from those of
-/// the other bits of `active`, in 64 rows of `width` units.
+/// Adds the outer product of a word of a code and of units' coefficients to 64 rows of `width`
+/// units: coefficients are added to the rows of bits in `positive`, and subtracted from the rows of
+/// other bits in `active`.
 SDNN_KERNEL(void, add_outer,
             (std::int16_t* rows, std::size_t width, const std::int16_t* coefficients,
              std::uint64_t active, std::uint64_t positive),
             (rows, width, coefficients, active, positive))
 
-/// Adds the rows `plus` of a tile to sums[i], and subtracts its rows `minus`, i = 0 .. width - 1;
-/// at most `n_per_sum` rows are added before the sum is widened.
+/// Adds to sums[i], i < width, the weights of unit i in the rows `plus` of a tile, and subtracts
+/// those in the rows `minus`. At most `n_per_sum` rows are summed in the weights' type, which must
+/// hold the sum, before it is added to `sums`.
 SDNN_KERNEL(void, add_rows,
             (const std::int16_t* tile, std::size_t width, std::span<const std::uint32_t> plus,
              std::span<const std::uint32_t> minus, std::size_t n_per_sum, std::int32_t* sums),
@@ -128,9 +131,9 @@ SDNN_KERNEL(void, add_rows,
              std::span<const std::uint32_t> minus, std::size_t n_per_sum, std::int32_t* sums),
             (tile, width, plus, minus, n_per_sum, sums))
 
-/// Weights in tiles of up to kTileUnits units, which store adjacent units slot by slot. A slot is a
-/// column's number when every pair's columns are padded to whole 64-bit words, so that slot s is
-/// bit s % 64 of word s / 64 of a code.
+/// Weights in tiles of up to kTileUnits units. A tile has a row for each slot, the weights of its
+/// units. A slot is the number of a column if the columns of every pair of inputs are padded to
+/// whole 64-bit words, so that slot s is bit s % 64 of word s / 64 of a code.
 ///
 /// All tiles are kTileUnits wide, except the last, whose width is the smallest multiple of 16 for
 /// the remaining units. Memory: sizeof(Weight) * n_slots * round_up(n_units, 16).
@@ -180,7 +183,7 @@ class WeightTiles {
     }
   }
 
-  /// The largest sum of a unit's |weights| in the slots [begin, end).
+  /// Returns the largest sum of a unit's |weights| in the slots [begin, end).
   std::int64_t largest_norm(std::size_t begin, std::size_t end) const {
     std::vector<std::int64_t> norms(n_padded_units());
     for (std::size_t t = 0; t < n_tiles(); ++t) {
