@@ -10,20 +10,20 @@ namespace sdnn::bindings {
 
 namespace {
 
+/// The parts of an agent that learn: the dimensions of fuzzy rules, or networks.
 auto parts_of(agents::FuzzyQLearning& agent) { return agent.dimensions(); }
 auto parts_of(auto& agent) { return agent.networks(); }
 
+/// The object of a part that has a class in Python.
 approximators::FuzzyRules& bound_part(agents::detail::FuzzyDimension& part) { return part.rules(); }
 auto& bound_part(auto& network) { return network; }
 
 }  // namespace
 
-/// Lists the networks or rules of an agent, one for each dimension, as views that keep `owner`
-/// alive.
 pybind11::list networks_of(agents::AnyAgent& agent, pybind11::handle owner) {
   pybind11::list networks;
-  const auto add = [&](auto& of_kind) {
-    for (auto& part : parts_of(of_kind)) {
+  const auto add = [&](auto& typed_agent) {
+    for (auto& part : parts_of(typed_agent)) {
       networks.append(pybind11::cast(bound_part(part),
                                      pybind11::return_value_policy::reference_internal, owner));
     }
@@ -34,7 +34,8 @@ pybind11::list networks_of(agents::AnyAgent& agent, pybind11::handle owner) {
 
 std::span<std::byte> memory_of_parts(agents::AnyAgent& agent) {
   return std::visit(
-      [](auto& of_kind) { return std::as_writable_bytes(std::span(parts_of(of_kind))); }, agent);
+      [](auto& typed_agent) { return std::as_writable_bytes(std::span(parts_of(typed_agent))); },
+      agent);
 }
 
 }  // namespace sdnn::bindings
@@ -43,11 +44,12 @@ namespace sdnn::tools {
 
 namespace {
 
-/// Whether actions of an agent are numbers in [-1, 1].
+/// Whether an agent's actions are numbers in [-1, 1], and not indices.
 template <class Agent>
 constexpr bool kHasNumbers =
     std::is_same_v<typename std::remove_cvref_t<Agent>::Action, BareAgent::Action>;
 
+/// Copies numbers or indices, converted to the type of `to`, which has the size.
 void assign(auto from, auto& to) {
   for (std::size_t d = 0; d < to.size(); ++d) {
     to[d] = static_cast<std::remove_cvref_t<decltype(to[d])>>(from[d]);

@@ -35,7 +35,8 @@ inline constexpr bool kIsList = false;
 template <class Value>
 inline constexpr bool kIsList<std::vector<Value>> = true;
 
-/// A type in the words of Python's type hints, or of error messages.
+/// Describes a type of values as a Python type hint ("int | None"), or else for an error message
+/// ("a whole number, or None").
 template <class Value>
 std::string words_of_type(bool is_hint) {
   if constexpr (kIsOptional<Value>) {
@@ -58,20 +59,21 @@ std::string words_of_type(bool is_hint) {
   }
 }
 
-/// An argument is of another type. Python gets a TypeError with the attribute `argument`.
+/// The error for an argument of a wrong type. Python raises a TypeError whose attribute `argument`
+/// has its name.
 class ArgumentTypeError : public core::ArgumentError {
  public:
   using NamedError::NamedError;
 };
 
-/// The representation of any value, for a message.
+/// Returns a short representation of a Python object, for a message.
 inline std::string shown(pybind11::handle value) {
   return pybind11::module_::import("sdnn.support.arguments")
       .attr("shown")(value)
       .cast<std::string>();
 }
 
-/// Whether it is True or False, of Python or NumPy.
+/// Whether an object is True or False, of Python or NumPy.
 inline bool is_truth(pybind11::handle value) {
   namespace py = pybind11;
   if (PyBool_Check(value.ptr())) return true;
@@ -82,7 +84,8 @@ inline bool is_truth(pybind11::handle value) {
 
 struct Field;
 
-/// The description of a type of values that Python needs.
+/// A type of values of fields: how it is described, converted to Python and read from Python.
+/// `value` is the address of a value of the type.
 struct ValueType {
   std::string (*words)(bool is_hint);
   bool has_bounds;
@@ -91,9 +94,9 @@ struct ValueType {
   bool (*read)(pybind11::handle source, void* value, const Field& field);
 };
 
-/// A field of a configuration object, with the address of its value. The configuration's type is
-/// erased: code for every field of every configuration would take long to compile, whereas the
-/// functions below are compiled once per type of values.
+/// A field of a configuration object, with the address of its value. It does not depend on the type
+/// of the configuration, so that the functions below are compiled once for each type of values, and
+/// not for every field of every configuration, which would take long.
 struct Field {
   const char* name;
   const char* doc;
@@ -101,10 +104,6 @@ struct Field {
   const ValueType* type;
   void* value;
 };
-
-/// Reads a Python value; false if it has another type: True is no number, 1.0 is no integer.
-template <class Value>
-bool read_value(pybind11::handle source, Value& value, const Field& field);
 
 /// Reads a Python integer, or NumPy's. Returns false for other objects; throws if it is too large.
 template <std::integral Number>
@@ -129,7 +128,9 @@ bool read_whole(pybind11::handle source, Number& value, const Field& field) {
   return true;
 }
 
-/// Converts a Python object to a field's value. Returns false for an object of the wrong type.
+/// Reads a Python object into a field's value. Returns false for an object of the wrong type: True
+/// is no number, and 1.0 is no integer. Throws ArgumentError for an unknown word or too large a
+/// number.
 template <class Value>
 bool read_value(pybind11::handle source, Value& value, const Field& field) {
   namespace py = pybind11;
@@ -172,7 +173,7 @@ bool read_value(pybind11::handle source, Value& value, const Field& field) {
   }
 }
 
-/// A value as Python has it: lists as tuples, which have a hash.
+/// Converts a value to Python. Lists become tuples, so that configurations can be hashed.
 template <class Value>
 pybind11::object python_value(const Value& value) {
   if constexpr (kIsList<Value>) {
@@ -200,7 +201,8 @@ inline constexpr ValueType kValueType{
         },
 };
 
-/// The fields of a configuration. Their values may be written only where it is not const.
+/// Lists the fields of a configuration. Their values may be written only if `config` refers to an
+/// object that is not const.
 template <class Config>
 auto fields_of(const Config& config) {
   const auto erased = [&config](const auto& field) {
@@ -254,7 +256,8 @@ Config changed(Config config, const pybind11::kwargs& changes) {
   return config;
 }
 
-/// (name, type hint, default, documentation, low, high, whether low itself is excluded) of each.
+/// Describes each field by (name, type hint, default, documentation, low, high, whether low itself
+/// is excluded).
 inline pybind11::tuple described_fields(std::span<const Field> fields) {
   pybind11::tuple described(fields.size());
   for (std::size_t i = 0; i < fields.size(); ++i) {
@@ -266,7 +269,7 @@ inline pybind11::tuple described_fields(std::span<const Field> fields) {
   return described;
 }
 
-/// A docstring in numpydoc's form.
+/// Makes a docstring in numpydoc's form.
 inline std::string docstring(const char* doc, std::span<const Field> fields) {
   std::string text = std::string(doc) + "\n\nParameters\n----------\n";
   for (const Field& field : fields) {
@@ -294,7 +297,7 @@ inline std::string listed(std::span<const Field> fields) {
   return values;
 }
 
-/// Binds a configuration.
+/// Binds a configuration as a frozen Python class, and returns the class.
 template <class Config>
 pybind11::class_<Config> bind_config(pybind11::module_& module, const char* name, const char* doc) {
   namespace py = pybind11;

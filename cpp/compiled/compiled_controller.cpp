@@ -16,7 +16,8 @@ namespace {
 
 using nlohmann::json;
 
-/// Chooses a preset by its name; by default "general", or the only one.
+/// Copies the preset that `spec` names to the configuration: by default the only preset, or
+/// "general" if there are several. Throws std::invalid_argument for an unknown name.
 template <class Preset, std::size_t N>
 void choose(const std::array<Named<Preset>, N>& presets, const AgentSpec& spec,
             ControllerConfig& config) {
@@ -34,6 +35,7 @@ void choose(const std::array<Named<Preset>, N>& presets, const AgentSpec& spec,
   detail::refuse("preset", expected, name);
 }
 
+/// Returns the configuration of the agent and preset that `spec` names, without a task.
 ControllerConfig preset_of(const AgentSpec& spec) {
   using namespace approximators;
   using RBFPreset = Settings<RBFNetworkConfig, QLearningConfig>;
@@ -58,14 +60,15 @@ ControllerConfig preset_of(const AgentSpec& spec) {
   return config;
 }
 
-/// Takes the bounds of the variables whose ranges are known.
-void take(const Box& box, ObservationConfig& config) {
+/// Sets the known bounds of variables in the configuration: those that are finite and differ.
+/// Throws std::invalid_argument for bounds that are not ordered.
+void set_bounds(const Box& box, ObservationConfig& config) {
   core::require_size("observation.high", box.high.size(), box.low.size(),
                      "numbers, one per variable as in observation.low");
   for (std::size_t i = 0; i < box.low.size(); ++i) {
     const double low = box.low[i], high = box.high[i];
     core::require(low <= high, "observation.low", "at most observation.high, and not NaN", low);
-    // Running ranges ignore bounds, even equal ones.
+    // Equal bounds are kept, so that they are refused later, unless running ranges ignore bounds.
     const bool is_known =
         std::isfinite(low) && std::isfinite(high) && (low < high || !config.running);
     config.low.push_back(is_known ? std::optional(low) : std::nullopt);
@@ -73,6 +76,7 @@ void take(const Box& box, ObservationConfig& config) {
   }
 }
 
+/// Returns the configuration of the actions of a space.
 ActionConfig action_of(const Box& box) { return {.low = box.low, .high = box.high}; }
 ActionConfig action_of(const MultiDiscrete& space) {
   ActionConfig config{.discrete = true, .number = ActionNumber::whole};
@@ -91,19 +95,22 @@ ActionConfig action_of(const Discrete& space) {
   return action_of(MultiDiscrete{.n = {space.n}, .start = {space.start}});
 }
 
+/// Converts a setting's value to JSON. A text that is JSON, such as a list, is parsed.
 json json_of(const SettingValue& value) {
   const auto* const text = std::get_if<std::string>(&value);
   if (text != nullptr && json::accept(*text)) return json::parse(*text);
-  return std::visit([](const auto& one) { return json(one); }, value);
+  return std::visit([](const auto& number_or_text) { return json(number_or_text); }, value);
 }
 
+/// Returns the configuration of a new agent: its preset, its task, and then its settings.
 ControllerConfig config_of(const AgentSpec& spec) {
   ControllerConfig config = preset_of(spec);
+  // The setting that decides which bounds are kept is read before all others.
   const auto running = spec.settings.find("observation.running");
   if (running != spec.settings.end()) {
     if (const bool* is = std::get_if<bool>(&running->second)) config.observation.running = *is;
   }
-  take(spec.observation, config.observation);
+  set_bounds(spec.observation, config.observation);
   core::require(spec.agent != "fuzzy" || std::holds_alternative<Box>(spec.action), "action",
                 "a Box for the agent fuzzy", "whole numbers");
   config.action = std::visit([](const auto& space) { return action_of(space); }, spec.action);

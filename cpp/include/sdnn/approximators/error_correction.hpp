@@ -20,9 +20,12 @@ namespace sdnn::approximators {
 
 namespace detail {
 
-/// Computes the distance of a unit with potential h from its threshold as h ^ flip + offset, an
-/// unsigned number: h - 1 in a search for active units, -h in one for inactive units, and at least
-/// 2^31 for all other units, which are thus never nearest.
+/// The constants of the distance of a unit with potential h from its threshold, the unsigned number
+/// (h ^ flip) + offset, in a search for active (h > 0) or inactive units.
+///
+/// For active units flip is 0 and the distance is h - 1; for inactive units flip has all bits set,
+/// and ~h + 1 = -h. A unit that is not searched for has a negative result, which as an unsigned
+/// number is at least 2^31: it is never the nearest.
 struct DistanceOf {
   explicit DistanceOf(bool active) noexcept : flip(active ? 0 : -1), offset(active ? -1 : 1) {}
 
@@ -30,8 +33,8 @@ struct DistanceOf {
   std::int32_t offset;
 };
 
-/// The first unit with the smallest distance below 2^31, or `size` if there is none. Units that
-/// must not be selected have larger distances; see DistanceOf.
+/// Returns the first unit with the smallest distance below 2^31, or `size` if there is none. Units
+/// that must not be selected have larger distances; see DistanceOf.
 inline std::size_t nearest_unit_portable(const std::int32_t* potentials, std::size_t size,
                                          const DistanceOf& of) noexcept {
   std::uint32_t nearest = std::uint32_t{1} << 31;
@@ -49,13 +52,15 @@ inline std::size_t nearest_unit_portable(const std::int32_t* potentials, std::si
 
 #if SDNN_X86_KERNELS
 
-/// Compares eight units at a time, and the last eight units again.
+/// Implements nearest_unit eight units at a time: first the least distance, then the first unit
+/// that has it. The last group is the last eight units, which may overlap the group before.
 [[SDNN_TARGET_AVX2]] inline std::size_t nearest_unit_avx2(const std::int32_t* potentials,
                                                           std::size_t size,
                                                           const DistanceOf& of) noexcept {
   if (size < 8) return nearest_unit_portable(potentials, size, of);
   const __m256i flip = _mm256_set1_epi32(of.flip);
   const __m256i offset = _mm256_set1_epi32(of.offset);
+  // The first unit of the group that begins at k, moved back if fewer than eight follow.
   const auto first_of = [size](std::size_t k) { return k + 8 <= size ? k : size - 8; };
   const auto distances = [&](std::size_t first) __attribute__((always_inline, target("avx2"))) {
     const auto* const at = reinterpret_cast<const __m256i*>(potentials + first);
@@ -63,13 +68,14 @@ inline std::size_t nearest_unit_portable(const std::int32_t* potentials, std::si
   };
   __m256i least = distances(0);
   for (std::size_t k = 8; k < size; k += 8) least = _mm256_min_epu32(least, distances(first_of(k)));
+  // Each step compares a register with its rearranged self; then all eight lanes have the least.
   least = _mm256_min_epu32(least, _mm256_permute2x128_si256(least, least, 1));
   least = _mm256_min_epu32(least, _mm256_shuffle_epi32(least, 0b01001110));
   least = _mm256_min_epu32(least, _mm256_shuffle_epi32(least, 0b10110001));
   if (_mm256_cvtsi256_si32(least) < 0) return size;  // 2^31 or more
   for (std::size_t k = 0;; k += 8) {
-    const __m256i found = _mm256_cmpeq_epi32(distances(first_of(k)), least);
-    const auto mask = static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(found)));
+    const __m256i is_least = _mm256_cmpeq_epi32(distances(first_of(k)), least);
+    const auto mask = static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(is_least)));
     if (mask != 0) return first_of(k) + static_cast<std::size_t>(std::countr_zero(mask));
   }
 }

@@ -27,8 +27,9 @@
 
 namespace sdnn::approximators {
 
-/// Q(s, a) = sum over the dimensions d of the action, and over the units in the window of a_d, of
-/// the inner product of the unit's weights and the code x_SD(s).
+/// Q(s, a) is the sum, over the dimensions d of the action and the rows in the window of a_d, of
+/// the inner product of the row's weights and the code x_SD(s). The window of an action has
+/// config.action_window neighbouring rows, so that neighbouring actions share rows.
 ///
 /// The maximum over all actions is the sum of the dimensions' maxima, which a single pass finds.
 ///
@@ -61,9 +62,9 @@ class LinearSDNN {
   static constexpr std::int32_t kRateOne = 1 << 16;
 
   /// Makes code books by anchor interpolation, or of symbols. `n_actions` has the number of actions
-  /// of each dimension. If `n_first` is not 0, inputs after the first `n_first` were added; see
-  /// continue_from. Throws std::invalid_argument naming the impossible field; std::length_error
-  /// naming bytes, before a large allocation; std::bad_alloc.
+  /// of each dimension. If `n_first` is not 0, only the first `n_first` inputs are those of an
+  /// earlier readout, which continue_from can copy. Throws std::invalid_argument naming the
+  /// impossible field; std::length_error naming bytes, before a large allocation; std::bad_alloc.
   LinearSDNN(const LinearSDNNConfig& config, std::span<const std::size_t> n_actions,
              std::uint64_t seed, std::size_t n_first = 0)
       : LinearSDNN(config, n_actions, code_books_of(with_pattern_units(config), seed), seed,
@@ -106,7 +107,7 @@ class LinearSDNN {
   std::size_t n_inputs() const noexcept { return code_->n_inputs(); }
   std::size_t n_dimensions() const noexcept { return dimensions_.size(); }
   std::size_t n_actions(std::size_t d = 0) const noexcept { return dimensions_[d].n_actions; }
-  /// The number of units of all dimensions, the rows of the weights.
+  /// The number of rows of weights; a dimension has n_actions + window - 1 of them.
   std::size_t n_rows() const noexcept { return n_rows_; }
   /// The number of columns of a row, including those that are always 0.
   std::size_t n_slots() const noexcept { return n_slots_; }
@@ -133,8 +134,8 @@ class LinearSDNN {
     workspace.bins_.clear();
     read_next(state, workspace);
   }
-  /// Reads a state into a workspace that has read this model last. A state with an equal code keeps
-  /// the sums of rows that have not changed.
+  /// Reads a state into a workspace that was last used with this model. If the state has the same
+  /// bins as the state before, the sums of rows that have not changed since are kept.
   void read_next(std::span<const double> state, Workspace& workspace) const {
     code_->bins_of(state, workspace.new_bins_);
     if (workspace.bins_ == workspace.new_bins_) return;
@@ -143,10 +144,7 @@ class LinearSDNN {
     std::uint64_t* const active = workspace.words_.data();
     std::uint64_t* const positive = active + code_->n_words();
     code_->encode(workspace.bins_, active, positive);
-    std::size_t n_active = 0;
-    for (std::size_t w = 0; w < code_->n_words(); ++w) {
-      n_active += static_cast<std::size_t>(std::popcount(active[w]));
-    }
+    std::size_t n_active = coding::n_active({active, positive}, code_->n_words());
     Code& code = workspace.code_;
     spread_signs(active, positive, code_->n_words(), code.signs_.data());
     n_active += thermometers_.write(workspace.bins_, code.signs_.data() + 64 * code_->n_words());
@@ -161,7 +159,7 @@ class LinearSDNN {
     const Dimension& dimension = dimensions_[d];
     const std::size_t end = dimension.first_row + dimension.n_actions + window() - 1;
     sum_rows(dimension.first_row, end, averaged && n_snapshots_ > 0, workspace);
-    std::int64_t sum = 0;
+    std::int64_t sum = 0;  // of the rows in a window that slides from action to action
     for (std::size_t row = dimension.first_row; row < end; ++row) {
       sum += workspace.row_sums_[row];
       const std::size_t n_summed = row - dimension.first_row + 1;
@@ -190,7 +188,7 @@ class LinearSDNN {
     });
     return total;
   }
-  /// Like `sum`, for the trace instead of the weights; kTraceOne stands for 1.
+  /// Computes what `sum` does from the trace instead of the weights, in units of 1 / kTraceOne.
   std::int64_t sum_of_trace(const Code& code, std::span<const std::size_t> action,
                             const Trace& trace) const noexcept {
     std::int64_t total = 0;
@@ -201,9 +199,9 @@ class LinearSDNN {
     return total;
   }
 
-  /// Adapts the unit to a number. The first number that is not 0 decides the size of the unit;
-  /// larger numbers may enlarge it. Returns the number of doublings. Requires a finite number of
-  /// magnitude 1e300 at most.
+  /// Adapts the unit to a number, such as a reward, that is to be expressed in it. The first number
+  /// that is not 0 decides the size of the unit; larger numbers may double it. Returns the number
+  /// of doublings. Requires a finite number of magnitude 1e300 at most.
   int fit_unit(double number) {
     if (number == 0.0) return 0;
     // The first number gets 31 bits: its highest bit has the exponent ilogb.
@@ -217,6 +215,7 @@ class LinearSDNN {
     if (!exponent_) return 0;
     return static_cast<std::int64_t>(std::floor(std::ldexp(number, -*exponent_) + 0.5));
   }
+  /// Returns the number that a value in units stands for, clipped to the finite doubles.
   double value_of(std::int64_t units) const noexcept {
     constexpr double kMost = std::numeric_limits<double>::max();
     return std::clamp(std::ldexp(static_cast<double>(units), exponent_.value_or(0)), -kMost, kMost);
@@ -231,7 +230,7 @@ class LinearSDNN {
     for (std::int32_t& weight : averaged_) weight = halved(weight);
     std::ranges::fill(versions_, ++version_);
   }
-  /// The number of leading bits that no weight uses.
+  /// The number of the 23 bits of a weight's magnitude that no weight uses, counted from the top.
   int spare_bits() const noexcept {
     std::uint32_t used = 0;
     for (const std::int32_t weight : weights_) used |= size_bits(weight);
@@ -255,12 +254,12 @@ class LinearSDNN {
   static std::int64_t refined(std::int64_t units, int n) noexcept {
     return std::clamp(units << std::min(n, kWeightBits), 1 - kLargestValue, kLargestValue - 1);
   }
-  /// The largest number of bits of a value with this number of weights.
+  /// Returns the largest number of bits of a sum of `n_weights` weights, at most 33.
   static int most_bits_of(std::int64_t n_weights) noexcept {
     const auto bits = static_cast<int>(std::bit_width(static_cast<std::uint64_t>(n_weights)));
     return std::min(kWeightBits + bits - 1, 33);
   }
-  /// The number of weights that contribute to Q(s, a) of the code's state, at least 1.
+  /// Returns the number of weights that contribute to Q(s, a) of the code's state, at least 1.
   std::int64_t n_weights_of(const Code& code) const noexcept {
     return std::max<std::int64_t>(
         1, std::int64_t{code.n_active()} * static_cast<std::int64_t>(n_dimensions() * window()));
@@ -279,6 +278,7 @@ class LinearSDNN {
         (std::int64_t{step.rate} << 12) / n_weights_of(code);
     RowStep row_step{
         .decay = step.decay, .gain = 0, .replace = 0, .step = 0, .shift = 1, .correction = 0};
+    // A dutch trace adds the code times 1 - rate / n * decay * (trace . code).
     std::int32_t gain = kTraceOne;
     if (step.is_dutch) {
       const std::int64_t before = scaled(sum_of_trace(code, action, trace), rate, 28);
@@ -297,7 +297,7 @@ class LinearSDNN {
     }
     const std::int64_t along_trace = scaled(error, rate, 28);
     int n_bits = 0;
-    // The product of step (13 bits) and trace (17 bits) must fit into 32 bits.
+    // A step keeps 13 bits, so that its product with a trace of 17 bits fits into 32 bits.
     while (std::abs(along_trace) >> n_bits >= (1 << 13) - 1) ++n_bits;
     row_step.step = static_cast<std::int32_t>(scaled(along_trace, 1, n_bits));
     row_step.shift = 12 - n_bits;  // a trace of 1 has 12 bits of fraction
@@ -384,7 +384,8 @@ class LinearSDNN {
                           const Code& code) const noexcept {
     return row_sum(&rows[row * n_slots()], code.signs().data(), n_slots());
   }
-  /// Updates the sums of rows that have changed from first to end, or those of the average.
+  /// Updates the sums of the rows from `first` to `end`, unless they are up to date; `averaged`
+  /// selects the average of the weights.
   void sum_rows(std::size_t first, std::size_t end, bool averaged,
                 Workspace& workspace) const noexcept {
     const std::vector<std::int32_t>& weights = averaged ? averaged_ : weights_;
@@ -415,7 +416,8 @@ class LinearSDNN {
 
   /// Doubles the unit until all weights are in their range; `used` has the bits that they use.
   void shrink_weights(std::int32_t used) noexcept;
-  /// Moves the average towards the weights by 1 / 2^k of the way, about 3 / (n + 3) after n steps.
+  /// Counts a step of learning; every averaging_interval steps moves the average to the weights by
+  /// 1 / 2^k of the way, about 3 / (n + 3) after n such snapshots.
   void note_step() noexcept {
     if (++n_steps_ % config_.averaging_interval != 0) return;
     const int k = static_cast<int>(std::bit_width(std::uint64_t(n_snapshots_ / 3 + 1))) - 1;
@@ -426,7 +428,7 @@ class LinearSDNN {
     if (n_snapshots_ < kMostSnapshots) ++n_snapshots_;
   }
 
-  static constexpr std::int64_t kMostSnapshots = 3 << 10;  // from here on, the window is constant
+  static constexpr std::int64_t kMostSnapshots = 3 << 10;  // from here on, k stays 10
 
   LinearSDNNConfig config_;
   std::shared_ptr<const coding::StateCode> code_;

@@ -31,7 +31,7 @@ struct InputPair {
   auto operator<=>(const InputPair&) const = default;
 };
 
-/// Tables that pairs may share.
+/// A table of patterns for each pair of inputs; pairs may share tables.
 using SharedTables = std::vector<std::shared_ptr<const PatternTable>>;
 
 namespace detail {
@@ -41,6 +41,7 @@ struct TableOfInput {
   const core::BitWord* words;
   std::size_t input;
 
+  /// Returns the pattern, of `n_words` words, for a sample with `bins`, one bin per input.
   SDNN_INLINE const core::BitWord* pattern(const Bin* bins, std::size_t n_words) const noexcept {
     return words + static_cast<std::size_t>(bins[input]) * n_words;
   }
@@ -53,8 +54,9 @@ struct Gate {
   std::size_t end;
 };
 
-/// The product <x_SD(a), x_SD(b)>, gate by gate: where both modifiers are on, the number of equal
-/// signs minus that of unequal signs. `Words` is n_words as a constant; 0 stands for any number.
+/// Computes the product <x_SD(a), x_SD(b)>, gate by gate: where both modifiers are +1, the number
+/// of equal signs minus that of unequal signs. `Words` is n_words as a constant, which lets the
+/// compiler unroll the loops; 0 stands for any number.
 template <std::size_t Words>
 SDNN_INLINE std::int32_t gated_product_of_width(std::span<const Gate> gates,
                                                 const TableOfInput* modified, std::size_t n_words,
@@ -99,8 +101,9 @@ SDNN_KERNEL(std::int32_t, gated_product,
 
 /// x_SD: for each pair (mu, nu) the pattern of input mu where that of nu is +1, and 0 elsewhere.
 ///
-/// In the paper x^mu(nu)_k = (1 + (sigma_mu_nu x^nu)_k) / 2 * x^mu_k. There is a table for each
-/// pair and role, whether it is shared by pairs, permuted or separate.
+/// In the paper x^mu(nu)_k = (1 + (sigma_mu_nu x^nu)_k) / 2 * x^mu_k. Every pair has a table of its
+/// modified input and a table of its modifier. Permutations are applied to the tables before, and
+/// pairs may share a table.
 ///
 /// Columns are numbered pair by pair, n_units each. Kernels number them in *slots*: each pair
 /// begins on a 64-bit word, so slots and columns differ if n_units % 64 != 0.
@@ -108,8 +111,9 @@ SDNN_KERNEL(std::int32_t, gated_product,
 /// Source: section 3.1 (layer 3); Nonaka, Tanaka, Morita 2011.
 class SelectiveDesensitization {
  public:
-  /// Takes a table from each list for every pair. Consecutive pairs with the same modifier table
-  /// form a gate, so that inner products read this table once.
+  /// Makes the code of `pairs`; pair p uses tables modified[p] and modifiers[p]. Consecutive pairs
+  /// with the same modifier and modifier table form a gate, so that inner products read this table
+  /// once.
   ///
   /// Throws std::invalid_argument if the lists differ in length or are empty, if the tables differ
   /// in n_units, or if two tables of one input differ in n_bins.
@@ -123,13 +127,13 @@ class SelectiveDesensitization {
     core::require(modifiers_.size() == pairs_.size(), "modifiers", "one table per pair",
                   modifiers_.size());
     for (std::size_t p = 0; p < pairs_.size(); ++p) {
-      note_input(pairs_[p].modified, *modified_[p]);
-      note_input(pairs_[p].modifier, *modifiers_[p]);
+      record_bins(pairs_[p].modified, *modified_[p]);
+      record_bins(pairs_[p].modifier, *modifiers_[p]);
     }
     const std::uint64_t n_columns = std::uint64_t{n_pairs()} * n_units();
     core::require(n_columns <= (std::uint64_t{1} << 30), "n_pairs * n_units", "at most 2^30",
                   n_columns);
-    std::size_t most_on = 0;
+    std::size_t most_on = 0;  // the largest number of +1 in a pattern of the latest gate
     for (std::size_t p = 0; p < pairs_.size(); ++p) {
       modified_at_.push_back({modified_[p]->words(), pairs_[p].modified});
       const bool is_new = p == 0 || modifiers_[p] != modifiers_[p - 1] ||
@@ -163,6 +167,7 @@ class SelectiveDesensitization {
   std::size_t n_bins(std::size_t input) const noexcept { return n_bins_[input]; }
   InputPair pair(std::size_t p) const noexcept { return pairs_[p]; }
 
+  /// Returns the slot of a column, which lies at the same unit of the same pair.
   std::size_t slot_of(std::size_t column) const noexcept {
     return column / n_units() * 64 * n_pair_words() + column % n_units();
   }
@@ -201,7 +206,7 @@ class SelectiveDesensitization {
     }
   }
 
-  /// Encodes a word of a pair's part of the code, from the bins of its inputs.
+  /// Encodes a single word, number `word` of a pair, from the bins of the pair's inputs.
   void encode_word(std::size_t pair, std::size_t word, Bin modified, Bin modifier,
                    std::uint64_t* active, std::uint64_t* positive) const noexcept {
     const std::size_t n_words = n_pair_words();
@@ -237,8 +242,9 @@ class SelectiveDesensitization {
     return most;
   }
 
-  /// Checks that all tables have the same units, and those of one input the same bins.
-  void note_input(std::size_t input, const PatternTable& table) {
+  /// Records the number of bins of an input. Throws std::invalid_argument unless all tables have
+  /// the same number of units, and all tables of one input the same number of bins.
+  void record_bins(std::size_t input, const PatternTable& table) {
     core::require(input < (std::size_t{1} << 20), "pairs", "inputs below 2^20", input);
     core::require(table.n_units() == n_units(), "tables", "all of one n_units", table.n_units());
     if (input >= n_bins_.size()) n_bins_.resize(input + 1);
@@ -252,7 +258,7 @@ class SelectiveDesensitization {
   std::vector<InputPair> pairs_;
   std::vector<std::size_t> n_bins_;
   std::vector<detail::Gate> gates_;
-  std::vector<detail::TableOfInput> modified_at_;  // places of the modified patterns, by pair
+  std::vector<detail::TableOfInput> modified_at_;  // for each pair, where its modified patterns are
   std::size_t max_active_ = 0;
 };
 

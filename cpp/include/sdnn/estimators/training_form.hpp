@@ -21,10 +21,10 @@ namespace sdnn::estimators {
 
 /// Forms of training, all with equal results.
 enum class TrainingForm {
-  automatic,  ///< the fastest form that fits into the memory limit
-  dual,       ///< potentials of all training samples, moved by rows of their inner products
-  block,      ///< potentials of a block of samples in one pass over the weights
-  plain,      ///< sample by sample
+  automatic,  ///< the form estimated to be fastest among those that fit into the memory limit
+  dual,       ///< keeps the potentials of all samples; a correction adds a row of inner products
+  block,      ///< computes the potentials of a block of samples in one pass over the weights
+  plain,      ///< computes the potentials of each sample by a pass over the weights
 };
 
 inline constexpr std::array kTrainingForms{TrainingForm::automatic, TrainingForm::dual,
@@ -47,8 +47,8 @@ inline TrainingForm training_form_named(std::string_view name) {
 /// The default limit of bytes of training beside the layer.
 inline constexpr std::size_t kMemoryLimit = std::size_t{1} << 30;
 
-/// Calls the template `function` with the smallest integer type, of 16 or 32 bits, for all inner
-/// products of codes.
+/// Calls the template `function` with the smallest integer type, of 16 or 32 bits, that holds 1
+/// plus any inner product of codes.
 template <class Function>
 decltype(auto) with_product_type(const coding::SelectiveDesensitization& code,
                                  const Function& function) {
@@ -58,8 +58,8 @@ decltype(auto) with_product_type(const coding::SelectiveDesensitization& code,
   return function.template operator()<std::int32_t>();
 }
 
-/// The bytes that a form needs beside the layer and the samples' bins; an estimate at most 1 % too
-/// low. If `keeps_plans`, block training stores the constant parts of its blocks.
+/// Returns the bytes that a form needs beside the layer and the samples' bins; an estimate at most
+/// 1 % too low. With `keeps_plans`, block training stores the constant parts of its blocks.
 inline std::uint64_t form_memory(TrainingForm form, std::size_t n_units,
                                  const coding::SelectiveDesensitization& code,
                                  std::size_t n_samples, bool keeps_plans = false) {
@@ -75,19 +75,22 @@ inline std::uint64_t form_memory(TrainingForm form, std::size_t n_units,
   });
 }
 
-/// The assumed number of epochs if none is given.
+/// The number of epochs that is assumed if the caller gives none.
 inline constexpr std::size_t kExpectedEpochs = 30;
 
-/// Chooses the form. An estimate of the time per presentation decides between dual and block. Dual
-/// training updates a row of n_samples for every corrected unit, three times slower outside the
-/// caches. It also computes n_samples^2 / 2 inner products and the first potentials, divided by
-/// `n_epochs`. Block training reads all weights.
+/// Chooses the form, by estimates of the time per presentation.
+///
+/// Dual training adds a row of n_samples products for every corrected unit, three times slower if
+/// its memory exceeds the caches. At the beginning it computes n_samples^2 / 2 inner products and
+/// the first potentials; their time is divided by `n_epochs`. Block training reads all weights.
 ///
 /// Throws std::length_error if `form` is not automatic and needs more than `memory_limit` bytes.
 inline TrainingForm choose_form(TrainingForm form, std::size_t n_units,
                                 const coding::SelectiveDesensitization& code, std::size_t n_samples,
                                 std::size_t memory_limit, std::size_t n_epochs = kExpectedEpochs) {
-  const auto memory = [&](TrainingForm f) { return form_memory(f, n_units, code, n_samples); };
+  const auto memory = [&](TrainingForm needed) {
+    return form_memory(needed, n_units, code, n_samples);
+  };
   if (form != TrainingForm::automatic) {
     if (memory(form) > memory_limit) {
       core::fail(std::length_error("memory_limit must be at least " + std::to_string(memory(form)) +

@@ -1,5 +1,5 @@
-/// Kernels on the weights of a block of units, for each instruction set: sums of columns, which are
-/// the hidden pass, corrections, and the largest weight of each unit.
+/// Kernels on the weights of a block of units, for each instruction set. They add columns of
+/// weights to potentials, change columns of weights, and find the largest weight of each unit.
 #pragma once
 
 #include <algorithm>
@@ -27,14 +27,16 @@ namespace sdnn::approximators {
 /// The number of hidden units whose weights are adjacent: a cache line of bytes for each column.
 inline constexpr std::size_t kBlockUnits = 64;
 
-/// A list of columns for the kernels, padded with a column of zeros to a multiple of kAtOnce, and
-/// followed by the first columns of the next block, which are prefetched. A place is the offset of
-/// a column in its block divided by kPlaceBytes, a factor that a load instruction can apply.
+/// A list of columns for the kernels, as *places*: a place is the byte offset of a column in its
+/// block divided by kPlaceBytes, because a load instruction can multiply an index by 8. The list is
+/// padded with the place of a column of zeros to a multiple of kAtOnce. The places of the first
+/// columns in the next block follow, for prefetching.
 class ColumnPlaces {
  public:
   static constexpr std::size_t kMost = 1024;
   static constexpr std::size_t kAtOnce = 8;
-  /// The number of columns to prefetch, by the latency of a shared last-level cache.
+  /// How many columns ahead the kernels prefetch; chosen for the latency of a shared last-level
+  /// cache.
   static constexpr std::size_t kPrefetchAhead = 64;
   static constexpr std::size_t kPlaceBytes = 8;
 
@@ -46,16 +48,19 @@ class ColumnPlaces {
     const auto end = std::ranges::transform(columns, places_.begin(), [](std::uint32_t column) {
                        return column * kFactor;
                      }).out;
-    std::uint32_t* const all = places_.data() + size_;
-    std::fill(std::to_address(end), all, static_cast<std::uint32_t>(zeros) * kFactor);
-    const std::uint32_t block = (static_cast<std::uint32_t>(zeros) + 1) * kFactor;
-    for (std::size_t k = 0; k < kPrefetchAhead; ++k) all[k] = block + (k < size_ ? places_[k] : 0);
+    std::uint32_t* const padded_end = places_.data() + size_;
+    std::fill(std::to_address(end), padded_end, static_cast<std::uint32_t>(zeros) * kFactor);
+    // The column of zeros is the last of its block, so the next block begins behind it.
+    const std::uint32_t next_block = (static_cast<std::uint32_t>(zeros) + 1) * kFactor;
+    for (std::size_t k = 0; k < kPrefetchAhead; ++k) {
+      padded_end[k] = next_block + (k < size_ ? places_[k] : 0);
+    }
   }
 
   /// The number of places, a multiple of kAtOnce.
   std::size_t size() const noexcept { return size_; }
-  /// The size() places, followed by kPrefetchAhead places of the next block, which are only
-  /// prefetched.
+  /// The size() places, and behind them kPrefetchAhead places of the next block, which kernels may
+  /// only prefetch.
   const std::uint32_t* data() const noexcept { return places_.data(); }
 
  private:
@@ -65,10 +70,12 @@ class ColumnPlaces {
 
 namespace detail {
 
-/// The number of groups of columns whose sum fits into 16 bits: 256 * 127 < 2^15.
+/// The number of groups whose sum fits into 16 bits, as the columns of a group have a sum of at
+/// most 127: 256 * 127 < 2^15.
 inline constexpr std::size_t kGroupsPerSum = 256;
 
-/// The number of places from `begin` whose sum, in groups of `Group`, fits into 16 bits.
+/// Returns the end of the places from `begin` on whose columns may be added in 16 bits, in groups
+/// of `Group` columns.
 template <std::size_t Group>
 const std::uint32_t* end_of_part(const std::uint32_t* begin, const std::uint32_t* end) noexcept {
   return begin + std::min(Group * kGroupsPerSum, static_cast<std::size_t>(end - begin));
@@ -81,8 +88,9 @@ const std::uint32_t* end_of_part(const std::uint32_t* begin, const std::uint32_t
 
 using Bytes = std::array<std::int8_t, kBlockUnits>;
 
-/// The sum of `Group` columns in 8 bits, by halves, in loops that every compiler vectorizes. The
-/// bytes are copied first, because they may alias any memory.
+/// Adds `Group` columns in 8 bits, by halves, in loops that every compiler vectorizes. The columns
+/// are copied first: a compiler must assume that writes through pointers to bytes change any
+/// memory.
 template <std::size_t Group>
 Bytes group_sum_portable(const std::int8_t* block, const std::uint32_t* places) noexcept {
   Bytes sum;
@@ -98,8 +106,8 @@ Bytes group_sum_portable(const std::int8_t* block, const std::uint32_t* places) 
   return sum;
 }
 
-/// Adds `factor` times the sum of the columns to `sums`. Groups of columns are summed in bytes,
-/// groups of a part in 16 bits.
+/// Adds `factor` times the sum of the columns to `sums`: columns of a group are added in 8 bits,
+/// the groups of a part (see end_of_part) in 16 bits, and the parts in 32 bits.
 template <std::size_t Group>
 void add_groups_portable(const std::int8_t* block, const ColumnPlaces& places, int factor,
                          std::int32_t* sums) {
@@ -117,7 +125,7 @@ void add_groups_portable(const std::int8_t* block, const ColumnPlaces& places, i
   }
 }
 
-/// The function add_columns below without vector instructions.
+/// Implements add_columns, below, without vector instructions.
 inline void add_columns_portable(const std::int8_t* block, const ColumnPlaces& places, int group,
                                  int factor, std::int32_t* sums) {
   switch (group) {
@@ -145,7 +153,8 @@ inline void add_columns_portable(const std::int8_t* block, const ColumnPlaces& p
 
 #if SDNN_NEON_KERNELS
 
-/// Adds the columns of each group in 8 bits, and their sum, which this widens, to sums of 16 bits.
+/// Works like add_groups_portable; an instruction of NEON widens a group's sums and adds them to
+/// those of 16 bits.
 template <std::size_t Group>
 void add_groups_neon(const std::int8_t* block, const ColumnPlaces& places, int factor,
                      std::int32_t* sums) {
@@ -177,8 +186,7 @@ void add_groups_neon(const std::int8_t* block, const ColumnPlaces& places, int f
   }
 }
 
-/// Adds `factor` times the sum of the columns; `group` columns, 4, 2 or 1, are added in bytes
-/// before the sum is widened.
+/// Implements add_columns, below, for NEON.
 inline void add_columns_neon(const std::int8_t* block, const ColumnPlaces& places, int group,
                              int factor, std::int32_t* sums) {
   switch (group) {
@@ -195,12 +203,14 @@ inline void add_columns_neon(const std::int8_t* block, const ColumnPlaces& place
 
 #if SDNN_X86_KERNELS
 
-// Both vector kernels take two groups of columns at a time: the columns of a group are added in 8
-// bits, the bytes of the two groups are interleaved, and one multiply-add by ones widens and adds
-// them pair by pair. Interleaving changes the order of the 16-bit sums, which is restored at the
-// end.
+// The kernels for AVX2 and AVX-512 take two groups of columns at a time. The columns of each group
+// are added in 8 bits. The bytes of the two sums are interleaved, and an instruction that
+// multiplies neighbouring bytes by ones and adds the products makes a 16-bit sum of both groups for
+// each unit. Interleaving works within 16 bytes, so the 16-bit sums are in another order than the
+// units; it is restored when they are added to the result.
 
-/// The sum of a group's columns in bytes, for one half of the block's units.
+/// Adds the columns of a group in 8 bits, for the first (0) or second (1) half of the block's
+/// units.
 [[SDNN_TARGET_AVX2, gnu::always_inline]] inline __m256i group_sum_avx2(const std::int8_t* block,
                                                                        const std::uint32_t* places,
                                                                        std::size_t group,
@@ -213,8 +223,7 @@ inline void add_columns_neon(const std::int8_t* block, const ColumnPlaces& place
   return sum;
 }
 
-/// Works like add_groups_portable: pairs of group sums are interleaved and added to 16 bits at
-/// once.
+/// Works like add_groups_portable, with two groups at a time as described above.
 template <std::size_t Group>
 [[SDNN_TARGET_AVX2]] void add_groups_avx2(const std::int8_t* block, const ColumnPlaces& places,
                                           int factor, std::int32_t* sums) {
@@ -230,29 +239,30 @@ template <std::size_t Group>
         for (std::size_t half = 0; half < 2; ++half) {
           __m256i first = group_sum_avx2(block, begin + k, Group, half);
           __m256i second = group_sum_avx2(block, begin + k + Group, Group, half);
-          asm("" : "+x"(first), "+x"(second));  // GCC would load each column twice
+          // Empty statements keep GCC from loading each column twice, ...
+          asm("" : "+x"(first), "+x"(second));
           wide[2 * half] = _mm256_add_epi16(
               wide[2 * half], _mm256_maddubs_epi16(ones, _mm256_unpacklo_epi8(first, second)));
           wide[2 * half + 1] = _mm256_add_epi16(
               wide[2 * half + 1], _mm256_maddubs_epi16(ones, _mm256_unpackhi_epi8(first, second)));
         }
-        // ... nor would it keep the sums in registers.
+        // ... and from storing the sums in memory between the steps.
         asm("" : "+x"(wide[0]), "+x"(wide[1]), "+x"(wide[2]), "+x"(wide[3]));
       }
     }
-    for (std::size_t quarter = 0; quarter < 8; ++quarter) {  // eight units each, in unit order
-      const std::size_t half = quarter / 4;
-      const __m256i sixteen = wide[2 * half + quarter % 2];
+    for (std::size_t eighth = 0; eighth < 8; ++eighth) {  // eight units each, in unit order
+      const std::size_t half = eighth / 4;
+      const __m256i sixteen = wide[2 * half + eighth % 2];
       const __m128i eight =
-          quarter % 4 < 2 ? _mm256_castsi256_si128(sixteen) : _mm256_extracti128_si256(sixteen, 1);
-      auto* const at = reinterpret_cast<__m256i*>(sums + 8 * quarter);
+          eighth % 4 < 2 ? _mm256_castsi256_si128(sixteen) : _mm256_extracti128_si256(sixteen, 1);
+      auto* const at = reinterpret_cast<__m256i*>(sums + 8 * eighth);
       const __m256i change = _mm256_mullo_epi32(_mm256_cvtepi16_epi32(eight), factors);
       _mm256_storeu_si256(at, _mm256_add_epi32(_mm256_loadu_si256(at), change));
     }
   }
 }
 
-/// The function add_columns below for AVX2.
+/// Implements add_columns, below, for AVX2.
 [[SDNN_TARGET_AVX2]] inline void add_columns_avx2(const std::int8_t* block,
                                                   const ColumnPlaces& places, int group, int factor,
                                                   std::int32_t* sums) {
@@ -273,7 +283,7 @@ template <std::size_t Group>
 #pragma GCC diagnostic ignored "-Wuninitialized"
 #endif
 
-/// The sum of a group's columns in bytes, for all units of the block.
+/// Adds the columns of a group in 8 bits, for all units of the block.
 [[SDNN_TARGET_AVX512, gnu::always_inline]] inline __m512i group_sum_avx512(
     const std::int8_t* block, const std::uint32_t* places, std::size_t group) {
   __m512i sum = _mm512_load_si512(column_at(block, places[0]));
@@ -283,8 +293,7 @@ template <std::size_t Group>
   return sum;
 }
 
-/// Works like add_groups_portable: pairs of group sums are interleaved and added to 16 bits at
-/// once.
+/// Works like add_groups_portable, with two groups at a time as described above.
 template <std::size_t Group>
 [[SDNN_TARGET_AVX512]] void add_groups_avx512(const std::int8_t* block, const ColumnPlaces& places,
                                               int factor, std::int32_t* sums) {
@@ -319,7 +328,7 @@ template <std::size_t Group>
   }
 }
 
-/// The function add_columns below for AVX-512.
+/// Implements add_columns, below, for AVX-512.
 [[SDNN_TARGET_AVX512]] inline void add_columns_avx512(const std::int8_t* block,
                                                       const ColumnPlaces& places, int group,
                                                       int factor, std::int32_t* sums) {
@@ -341,10 +350,11 @@ template <std::size_t Group>
 
 }  // namespace detail
 
-/// Adds factor * sum over the columns at `places` of column[i] to sums[i], for i = 0..63.
+/// Adds to sums[i], for each of the 64 units i of a block, `factor` times the sum of the unit's
+/// weights in the columns at `places`.
 ///
-/// `group` (1, 2 or 4) columns are added in 8 bits, which requires |weight| <= 127 / group in this
-/// block. All sums are exact, so every version gives the same result.
+/// `group` (1, 2 or 4) columns at a time are added in 8 bits, which requires |weight| <= 127 /
+/// group in this block. All sums are exact, so every version gives the same result.
 SDNN_DISPATCH(void, add_columns,
               (const std::int8_t* block, const ColumnPlaces& places, int group, int factor,
                std::int32_t* sums),
@@ -355,7 +365,7 @@ namespace detail {
 using ByteRegister = core::IntegerRegister<std::int8_t>;
 inline constexpr std::size_t kRegistersOfColumn = kBlockUnits / ByteRegister::kSize;
 
-/// Adds `change`, a byte for each unit, to each of the listed columns.
+/// Implements add_to_columns, below.
 SDNN_INLINE void add_to_columns_body(std::int8_t* block, const std::uint32_t* columns,
                                      std::size_t n_columns, const Bytes& change) noexcept {
   for (std::size_t k = 0; k < n_columns; ++k) {
@@ -369,7 +379,7 @@ SDNN_INLINE void add_to_columns_body(std::int8_t* block, const std::uint32_t* co
   }
 }
 
-/// Writes the largest |byte| of each unit in all columns.
+/// Implements find_largest_bytes, below.
 SDNN_INLINE void find_largest_bytes_body(const std::int8_t* block, std::size_t n_columns,
                                          Bytes& largest) noexcept {
   ByteRegister sizes[kRegistersOfColumn];
@@ -386,13 +396,14 @@ SDNN_INLINE void find_largest_bytes_body(const std::int8_t* block, std::size_t n
 
 }  // namespace detail
 
-/// Adds `change`, a byte for each unit, to columns of a block, modulo 256.
+/// Adds change[i] to the byte of each unit i in the listed columns of a block, modulo 256.
 SDNN_KERNEL(void, add_to_columns,
             (std::int8_t* block, const std::uint32_t* columns, std::size_t n_columns,
              const detail::Bytes& change),
             (block, columns, n_columns, change))
 
-/// The largest |byte| of each unit in the first columns of a block. No byte may be -128.
+/// Writes to largest[i] the largest |byte| of unit i in the first n_columns columns of a block. No
+/// byte may be -128.
 SDNN_KERNEL(void, find_largest_bytes,
             (const std::int8_t* block, std::size_t n_columns, detail::Bytes& largest),
             (block, n_columns, largest))

@@ -1,4 +1,4 @@
-/// Training sample by sample: the potentials of a sample, then its corrections.
+/// Training sample by sample.
 #pragma once
 
 #include <cstddef>
@@ -16,8 +16,9 @@
 
 namespace sdnn::estimators {
 
-/// The plain form of training, to which the results of other forms are equal. It corrects the
-/// layer's weights directly, with a constant amount of memory.
+/// The plain form of training, whose results define those of the other forms. For each sample it
+/// computes the potentials and corrects the layer's weights. Its memory does not depend on the
+/// number of samples.
 class PlainTraining {
  public:
   PlainTraining(std::shared_ptr<ParallelPerceptron> layer, std::span<const std::int32_t> bins,
@@ -50,12 +51,14 @@ class PlainTraining {
     return count;
   }
 
+  /// Does nothing: the layer's weights are always up to date.
   void synchronize() noexcept {}
 
  private:
+  /// Computes the potentials of the sample whose columns are in `slots_`.
   void sum_potentials() {
     for (std::size_t i = 0; i < layer_->n_units(); ++i) potentials_[i] = -layer_->thresholds()[i];
-    layer_->tiles().add_columns(slots_.columns(), std::size_t{1} << 30, potentials_.data());
+    layer_->tiles().add_columns(slots_.columns(), kNoLimit, potentials_.data());
   }
 
   /// Adds direction * x_SD to a unit's weights, and subtracts direction from its threshold.
@@ -68,6 +71,8 @@ class PlainTraining {
     for (const std::uint32_t slot : slots.minus) first[slot * width] -= correction.direction;
     layer_->thresholds()[correction.unit] -= correction.direction;
   }
+
+  static constexpr std::size_t kNoLimit = std::size_t{1} << 30;  // no sum of weights overflows
 
   std::shared_ptr<ParallelPerceptron> layer_;
   std::vector<std::int32_t> bins_;
