@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
 import click
 
-from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError
+from sdnn.runs.errors import ConfigError, RunError, RunTerminatedError, UnknownKeyError
 from sdnn.support.habits import advice
 
 if TYPE_CHECKING:
@@ -58,30 +58,56 @@ def option_of(key: str) -> str:
     return "ENV_ID" if key in ("environment", "environment.id") else f"--set {key}"
 
 
-def explained_option(error: click.NoSuchOption) -> click.UsageError:
-    """Return the error about an unknown option; it suggests a similar option or key."""
-    context = error.ctx
-    options = {} if context is None else {
+def ways_to_set(context: click.Context) -> dict[str, str]:
+    """Return how a command line sets each option of a command, and each setting, by their names.
+
+    Settings are only those of commands with ``--set``. Of ``sdnn train``: "steps" is set by
+    "--steps", "discount" by "--set learning.discount=...".
+    """
+    ways = {
         name.lstrip("-").replace("-", "_"): name
         for parameter in context.command.get_params(context)
         for name in (*parameter.opts, *parameter.secondary_opts)
         if name.startswith("--")
-    }  # fmt: skip
-    written = {}  # how the command line writes each name
-    if "set" in options:  # the command has options for the keys of a specification
+    }
+    options = set(ways.values())
+    if "--set" in options:
         from sdnn.runs.settings import KEYS_BY_NAME
 
         for name, key in KEYS_BY_NAME.items():
             option = option_of(key)
-            written[name] = f"{option}=..." if option.startswith("--set") else option
-        written["environment"] = "the argument ENV_ID"
-    hint = advice(error.option_name, options.values(), written | options)
-    return click.UsageError(f"No such option: {error.option_name}: {hint}", context)
+            if option.startswith("--set"):
+                ways.setdefault(name, f"{option}=...")
+            elif option in options:  # not every command has all options of `train`
+                ways.setdefault(name, option)
+        ways["environment"] = "the argument ENV_ID"
+    return ways
+
+
+def explained_option(error: click.NoSuchOption) -> click.UsageError:
+    """Return the error about an unknown option; it suggests a similar option or key."""
+    ways = {} if error.ctx is None else ways_to_set(error.ctx)
+    options = [way for way in ways.values() if way.startswith("--") and " " not in way]
+    hint = advice(error.option_name, dict.fromkeys(options), ways)
+    return click.UsageError(f"No such option: {error.option_name}: {hint}", error.ctx)
+
+
+def error_of_set(key: str, expected: str) -> click.UsageError:
+    """Return the error about a key that ``--set`` cannot set; it suggests what can be set."""
+    ways = ways_to_set(click.get_current_context())
+    hint = advice(key.rpartition(".")[2], (), ways) or "such as learning.discount"
+    return click.UsageError(f"--set {key}: must be {expected}; {hint}")
 
 
 def option_words(error: ConfigError) -> str:
     """Return an error's message, with the option in place of the key."""
-    return f"{option_of(error.key)}: {error.problem}"
+    option = option_of(error.key)
+    if isinstance(error, UnknownKeyError) and option.startswith("--set"):
+        options = ways_to_set(click.get_current_context())
+        meant = options.get(error.key.rpartition(".")[2].replace("-", "_"), "--set")
+        if not meant.startswith("--set"):
+            return f"{option}: unknown key; did you mean {meant}?"
+    return f"{option}: {error.problem}"
 
 
 def words_of_run(folder: Path) -> Callable[[ConfigError], str]:

@@ -15,6 +15,7 @@ from sdnn.cli.common import (
     NEW_FILE,
     SEED,
     Options,
+    error_of_set,
     json_option,
     json_text,
     named_values,
@@ -374,8 +375,7 @@ def _new_agent(
     for name, text in named_values("--set", settings):
         table, _, key = name.partition(".")
         if table not in tables or not key:
-            expected = "approximator.NAME or learning.NAME, such as learning.discount"
-            raise click.UsageError(f"--set {name}: must be {expected}")
+            raise error_of_set(name, "approximator.NAME or learning.NAME")
         tables[table][key] = value_of(text)
     kind = kind or "q-lambda"
     parts = {name: with_changes(new_settings(kind)[name], tables[name], name) for name in tables}

@@ -13,7 +13,6 @@ import click
 
 from sdnn.cli import common
 from sdnn.runs.errors import ConfigError
-from sdnn.support.habits import advice
 
 
 class SpecCommand(click.Command):
@@ -160,8 +159,9 @@ def _options_by_key(env_id: str | None, options: common.Options) -> common.Optio
     UsageError for a key that two different options set. If an option is given twice, the last
     value counts.
     """
-    from sdnn.runs.settings import KEYS_BY_NAME
+    from sdnn.runs.spec import RunSpec
 
+    tables = [name for name in RunSpec.__struct_fields__ if name != "seed"]
     by_key = {key: options.pop(key.replace(".", "_")) for key in common.KEYS}
     values = {k: value for k, value in by_key.items() if value is not None and value is not False}
     by_option = {key: (common.option_of(key), value) for key, value in values.items()}
@@ -186,12 +186,12 @@ def _options_by_key(env_id: str | None, options: common.Options) -> common.Optio
             name, bounds = _named_range(text)
             set_once(f"--range {name}", f"environment.ranges.{name}", bounds)
     for name, text in common.named_values("--set", options["settings"]):
-        if "." not in name:
-            problem = "must be TABLE.NAME; "
-            problem += advice(name, (), KEYS_BY_NAME) or "such as learning.discount"
-            if KEYS_BY_NAME.get(name) == name:
-                problem = f"is not in a table: use {common.option_of(name)}"
-            raise click.UsageError(f"--set {name}: {problem}")
+        table, dot, _ = name.partition(".")
+        if not dot or table not in tables:
+            expected = (
+                f"TABLE.NAME with one of the tables {', '.join(tables)}" if dot else "TABLE.NAME"
+            )
+            raise common.error_of_set(name, expected)
         set_once(f"--set {name}", name, common.value_of(text))
     return values
 

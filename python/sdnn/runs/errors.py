@@ -38,6 +38,10 @@ class ConfigError(RunError):
         return type(self), (self.key, self.problem, self.place)
 
 
+class UnknownKeyError(ConfigError):
+    """A table of settings has no such key."""
+
+
 class RunTerminatedError(RunError):
     """SIGTERM was received; the run was saved after the present step."""
 

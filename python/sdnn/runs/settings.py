@@ -17,7 +17,7 @@ from msgspec import Meta
 
 from sdnn.agents.registry import AGENTS
 from sdnn.config import WARM_UP, ProtocolConfig, fields_of
-from sdnn.runs.errors import ConfigError
+from sdnn.runs.errors import ConfigError, UnknownKeyError
 from sdnn.support.arguments import blamed, shown
 from sdnn.support.habits import advice
 
@@ -175,7 +175,7 @@ def check_names(
         if name not in known:
             path = _path(where, name)
             others = {last: key for last, key in KEYS_BY_NAME.items() if not path.endswith(key)}
-            raise ConfigError(path, f"unknown key; {advice(str(name), known, others)}{hint}")
+            raise UnknownKeyError(path, f"unknown key; {advice(str(name), known, others)}{hint}")
     return values
 
 
@@ -192,7 +192,7 @@ def read_table(settings_class: type[AnySettings], values: object, where: str = "
                 raise ConfigError(field.name, "must be given")
         return settings_class(**values)
     except ConfigError as error:
-        raise ConfigError(_path(where, error.key), error.problem, error.place) from error
+        raise type(error)(_path(where, error.key), error.problem, error.place) from error
 
 
 def with_changes(base: AnyPart, values: object, where: str, hint: str = "") -> AnyPart:

@@ -161,6 +161,8 @@ def test_the_actions_option_accepts_counts_and_ranges(actions, space, export, tm
         ((*SDNN_C, "--set", "approximator.averaging_interval=9"), "averaging_interval"),
         ((*SDNN_C, "--set", "approximator.weight_limit=0"), "weight_limit"),
         ((*SDNN_C, "--set", "learning.traces=dutch"), "--set"),
+        ((*SDNN_C, "--set", "ram=9000"), "did you mean --ram?"),
+        ((*SDNN_C, "--set", "learning.ram=9000"), "did you mean --ram?"),
         ((*RANGES, "--actions", "2", "--actions", "3", "--agent", "sdnn-c"), "--actions"),
         ((*RANGES, "--actions", "65536"), "--ram"),
     ],

@@ -439,8 +439,7 @@ def test_train_with_n_envs_learns_in_several_environments(invoke):
         ("--set learning.discount", "--set must be NAME=VALUE"),
         ("--set discount=1", "--set discount: must be TABLE.NAME"),
         ("--set learning.discont=1", "--set learning.discont: unknown"),
-        ("--set seed=1", "use --seed"),
-        ("--set gamma=1", "did you mean learning.discount?"),
+        ("--set gamma=1", "did you mean --set learning.discount=...?"),
         ("--gamma 1", "--gamma: did you mean --set learning.discount=...?"),
         ("--set agent.angles=[7]", "--set agent.angles: must"),
         ("--set learning.traces=\udcff", "learning.traces: must be one"),
@@ -455,6 +454,15 @@ def test_train_with_n_envs_learns_in_several_environments(invoke):
 def test_bad_options_of_train_exit_with_2_and_name_the_option(refused, tmp_path, options, words):
     assert words in refused("train", "CartPole-v1", *options.split(), code=2)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("place", ["", "train.", "learning."])
+@pytest.mark.parametrize("option", ["--agent", "--env-arg", "--json", "--out", "--seed", "--steps"])
+def test_an_option_that_is_given_to_set_is_named(refused, place, option):
+    setting = place + option.removeprefix("--").replace("-", "_")
+    error = refused("train", "CartPole-v1", "--set", f"{setting}=5", code=2)
+    assert f"--set {setting}: " in error
+    assert f"did you mean {option}?" in error
 
 
 @pytest.mark.parametrize(
