@@ -19,7 +19,7 @@ LinearAgent: TypeAlias = SDNNQLambda | SDNNActorCritic
 Steps: TypeAlias = Sequence[Transition]
 
 _MOST_STEPS = 10_000  # the number of steps that are in memory at once; longer episodes are split
-_LARGEST_RETURN = 1e300
+_LARGEST_RETURN = 1e300  # like the largest reward that an agent accepts
 
 
 @explained

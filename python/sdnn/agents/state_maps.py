@@ -36,7 +36,7 @@ class StateMap:
     typical: dict[str, float]
 
 
-N_ON_MAP, N_ON_CURVE = 49, 301
+N_ON_MAP, N_ON_CURVE = 49, 301  # points of a numeric axis, with two inputs and with one; chosen
 
 
 def map_of(
@@ -128,10 +128,9 @@ def replay(reader: Reader, env: Env, seed: int | None = 0, options: Data | None 
     Nothing is learned.
     """
     watched = WatchedAgent(reader.agent, reader=reader)
-    totals = [0.0]
+    totals = []  # the sum of rewards at the reset, 0, and after each step
     for now in greedy_episode(watched, env, seed, 0, options):
-        if now.n_steps:
-            totals.append(now.total_reward)
+        totals.append(now.total_reward)
         if now.n_steps == MOST_STEPS:
             break
     return Replay(

@@ -28,7 +28,7 @@ from sdnn.training.episodes import (
 from sdnn.training.files import fixed_statistics
 from sdnn.training.interfaces import UnusableStepError, explained, warn_of_endless_episode
 
-_LONG = 100_000  # warn after this many steps in one episode
+_LONG = 100_000  # warn after this many steps in one episode; a chosen number
 
 
 class ActingAgent(Protocol):
