@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
 
 _ESTIMATORS = ("SDNNRegressor", "SDNNClassifier")
 _MOST_ACTIONS = 2**16  # of --actions N, so that a mistyped number takes no memory; chosen
-_FEW_STEPS = 64  # a range with fewer steps of fixed point is reported as coarse; chosen
 _LARGEST = 2**31  # bounds of --range and --actions are below it: headers have 32-bit numbers
 
 
@@ -184,8 +184,6 @@ def export(
         except (TypeError, RuntimeError) as error:
             place = "" if source is None else f"{source}: "
             raise click.ClickException(f"{place}{error}") from error
-    for warning in _coarse_ranges(agent, agent_header.fraction_bits):
-        click.echo(f"warning: {warning}", err=True)
     if as_json:
         more = {"scaling": None if agent.scaling is None else agent.scaling.values()}
         click.echo(_words(path, agent_header, learning, more))
@@ -236,12 +234,19 @@ def _write_agent(
     durations: bool,
     fraction_bits: int | None,
 ) -> CHeader:
-    """Write the header of an agent; errors name the options. TypeError if it has no header."""
+    """Write the header of an agent; errors and warnings name the options.
+
+    TypeError if it has no header.
+    """
     from sdnn.export import c_header
     from sdnn.support.files import write_whole
 
     prefix = path.stem if name is None else name
-    with _errors_of_options(name, fraction_bits="--fraction-bits", durations="--durations"):
+    with (
+        _errors_of_options(name, fraction_bits="--fraction-bits", durations="--durations"),
+        warnings.catch_warnings(record=True) as caught,
+    ):
+        warnings.simplefilter("always")
         header = c_header(
             agent, prefix, fraction_bits=fraction_bits, learning=learning, durations=durations
         )
@@ -251,6 +256,9 @@ def _write_agent(
             f" got {flash}: make it with fewer units or inputs, such as by --ram with --new"
         )
     write_whole(path, header.text.encode())
+    for warning in caught:
+        message = str(warning.message).replace("fraction_bits", "--fraction-bits")
+        click.echo(f"warning: {message}", err=True)
     return header
 
 
@@ -314,23 +322,6 @@ def _estimator_in(source: Path) -> Fitted | None:
     # Users export files of their own: 4 GiB admit larger estimators than the default of `load`.
     model: Fitted = getattr(estimators, name).load(source, memory_limit=2**32)
     return model
-
-
-def _coarse_ranges(agent: AnyAgent, fraction_bits: int) -> Iterator[str]:
-    """Describe ranges of observations and actions with few values in fixed point, a line each."""
-    variables = sorted({at[0] for kind, at in agent.inputs if kind == "variable"})
-    ranges = [("observation", "observe", i, *(b[i] for b in agent.observation_range))
-              for i in variables]  # fmt: skip
-    if not agent._action.discrete:
-        bounds = zip(agent._action.low, agent._action.high, strict=True)
-        ranges += [("action", "give", i, low, high) for i, (low, high) in enumerate(bounds)]
-    for name, verb, i, low, high in ranges:  # verb: what the program does with the variable
-        n_steps = float(high - low) * 2.0**fraction_bits
-        if n_steps < _FEW_STEPS:
-            yield (
-                f"{name}[{i}], from {low:g} to {high:g}, has a range of only {n_steps:.2g} times"
-                f" 2^-{fraction_bits}: {verb} it in another unit, or with more --fraction-bits"
-            )
 
 
 def _read_agent_of(source: Path) -> AnyAgent:

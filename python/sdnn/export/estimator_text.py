@@ -46,6 +46,8 @@ class HeaderText(ABC):
     title: ClassVar[str] = "a regressor or classifier"
     file: ClassVar[str]
     code_size: ClassVar[str] = "4 to 7 kB"
+    remedy: ClassVar[str]
+    """How to get a smaller header, for messages."""
 
     def __init__(self, model: AnyModel, name: str, inputs: Sequence[CodedInput]) -> None:
         self.model, self.name, self.inputs = model, name, inputs

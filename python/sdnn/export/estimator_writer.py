@@ -30,6 +30,10 @@ class EstimatorWriter(HeaderText):
     """Makes the header of an estimator that predicts."""
 
     file: ClassVar[str] = "sdnn_greedy_estimator.h"
+    remedy = (
+        "train with the settings of sdnn.export.small_settings(), or with n_averaged_epochs=1, and"
+        " smaller n_output_units, n_units_per_class, n_pattern_units or fewer pairs"
+    )
     model: Model
 
     def __init__(self, model: Model, name: str) -> None:

@@ -7,17 +7,14 @@ from typing import TYPE_CHECKING
 
 from sdnn.export.estimator_text import EstimatorHeader, HeaderText
 from sdnn.export.estimator_writer import EstimatorWriter
-from sdnn.export.text import require_c_name, write_header
+from sdnn.export.text import header_file, require_c_name
 from sdnn.support.arguments import argument_error, flag, require, shown, whole
+from sdnn.support.files import write_whole
 
 if TYPE_CHECKING:
     from sdnn.export.estimator_text import AnyModel
 
 CODE_BYTES = 7000  # of a header's functions compiled for size, at most
-_REMEDY = (
-    "train with the settings of sdnn.export.small_settings(), or with n_averaged_epochs=1, and"
-    " smaller n_output_units, n_units_per_class, n_pattern_units or fewer pairs"
-)
 
 
 def export_estimator_header(
@@ -33,11 +30,10 @@ def export_estimator_header(
     The file is written as a whole or not at all. The name is by default the file's, without its
     ending; everything else is as for `estimator_header`.
     """
-
-    def make(prefix: str) -> EstimatorHeader:
-        return estimator_header(model, prefix, learning=learning, flash_bytes=flash_bytes)
-
-    return write_header(path, name, make)
+    file, prefix = header_file(path, name)
+    header = estimator_header(model, prefix, learning=learning, flash_bytes=flash_bytes)
+    write_whole(file, header.text.encode())
+    return header
 
 
 def estimator_header(
@@ -89,8 +85,16 @@ def estimator_header(
     """
     require_c_name(name)
     limit = None if flash_bytes is None else whole("flash_bytes", flash_bytes, 1, 2**40)
-    header = writer_of(model, name, learns=flag("learning", learning)).header()
-    require_flash(header, limit)
+    writer = writer_of(model, name, learns=flag("learning", learning))
+    header = writer.header()
+    needed = header.flash_bytes + CODE_BYTES
+    if limit is not None and needed > limit:
+        raise argument_error(
+            "flash_bytes",
+            f"must be at least {needed}, for constants of {header.flash_bytes} bytes"
+            f" ({writer.about()}; weights: {header.weight_bytes}) and code of up to {CODE_BYTES},"
+            f" got {limit}: {writer.remedy}",
+        )
     return header
 
 
@@ -117,14 +121,3 @@ def writer_of(model: AnyModel, name: str, *, learns: bool) -> HeaderText:
         return KernelWriter(model, name)
     expected = "must be an estimator of sdnn, such as an SDNNRegressor"
     raise argument_error("model", f"{expected}, got {shown(model)}", TypeError)
-
-
-def require_flash(header: EstimatorHeader, limit: int | None) -> None:
-    """Raise ValueError if a header takes more flash than a limit."""
-    needed = header.flash_bytes + CODE_BYTES
-    if limit is not None and needed > limit:
-        raise argument_error(
-            "flash_bytes",
-            f"must be at least {needed}, for constants of {header.flash_bytes} bytes (weights:"
-            f" {header.weight_bytes}) and code of up to {CODE_BYTES}, got {limit}: {_REMEDY}",
-        )

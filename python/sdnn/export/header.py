@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 import zlib
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,17 @@ from sdnn.agents.base import BaseAgent
 from sdnn.export.actor_critic import ActorCriticLearner, ActorCriticWriter
 from sdnn.export.q_lambda import QLambdaLearner, QLambdaWriter
 from sdnn.export.sdnn_c import SDNNCLearner, SDNNCWriter
-from sdnn.export.text import require_c_name, write_header
+from sdnn.export.text import header_file, require_c_name
 from sdnn.export.writer import CHeader, follows_ranges
 from sdnn.support.arguments import flag, require, shown
+from sdnn.support.files import write_whole
+
+_WRITERS: dict[type, tuple[Any, Any]] = {
+    SDNNQLearning: (SDNNCWriter, SDNNCLearner),
+    SDNNQLambda: (QLambdaWriter, QLambdaLearner),
+    SDNNActorCritic: (ActorCriticWriter, ActorCriticLearner),
+}
+"""The classes that write an agent's header: its greedy policy, and the agent that learns."""
 
 
 def export_c_header(
@@ -31,13 +40,12 @@ def export_c_header(
     The file is written as a whole or not at all. The name is by default the file's, without its
     ending; everything else is as for `c_header`.
     """
-
-    def make(prefix: str) -> CHeader:
-        return c_header(
-            agent, prefix, fraction_bits=fraction_bits, learning=learning, durations=durations
-        )
-
-    return write_header(path, name, make)
+    file, prefix = header_file(path, name)
+    header = _header(
+        agent, prefix, fraction_bits=fraction_bits, learning=learning, durations=durations
+    )
+    write_whole(file, header.text.encode())
+    return header
 
 
 def c_header(
@@ -86,6 +94,11 @@ def c_header(
     RuntimeError
         If the agent is still warming up.
 
+    Warns
+    -----
+    UserWarning
+        Of each range of observations or actions that has fewer than 64 values in fixed point.
+
     Examples
     --------
     >>> import gymnasium as gym
@@ -99,23 +112,46 @@ def c_header(
     >>> "uint32_t action = car_greedy(observation);" in header.text
     True
     """
-    learns = flag("learning", learning)
-    writer = writer_of(agent, require_c_name(name), fraction_bits, learns=learns)
+    return _header(agent, name, fraction_bits=fraction_bits, learning=learning, durations=durations)
+
+
+def _header(
+    agent: Any, name: str, *, fraction_bits: int | None, learning: bool, durations: bool
+) -> CHeader:
+    """Return an agent as a C header; warn the caller's caller of coarse ranges."""
+    writer = writer_of(
+        agent, require_c_name(name), fraction_bits, learns=learning, durations=durations
+    )
+    header: CHeader = writer.header()
+    for message in writer.coarse_ranges():
+        warnings.warn(message, stacklevel=3)
+    return header
+
+
+def writer_of(
+    agent: Any, name: str, fraction_bits: int | None, *, learns: bool, durations: bool = False
+) -> Any:
+    """Return the writer of an agent's header, a `Learner` if it learns.
+
+    TypeError for agents without a header. ValueError for agents and settings that C does not have.
+    """
+    flag("learning", learns)
     if flag("durations", durations):
         require(learns, "durations", "be False without learning=True", durations)
         expected = "be False for an SDNNQLearning, whose header learns usual steps alone"
         require(not isinstance(agent, SDNNQLearning), "durations", expected, durations)
-        writer.has_durations = True
-    header: CHeader = writer.header()
-    return header
+    _require_exportable(agent, learns=learns)
+    for agent_class, (policy_writer, learner) in _WRITERS.items():
+        if isinstance(agent, agent_class):
+            writer = (learner if learns else policy_writer)(agent, name, fraction_bits)
+            writer.has_durations = durations
+            return writer
+    expected = "an SDNNQLearning, SDNNQLambda or SDNNActorCritic"
+    raise TypeError(f"agent must be {expected}, got {shown(agent)}")
 
 
-def writer_of(agent: Any, name: str, fraction_bits: int | None, *, learns: bool) -> Any:
-    """Return the writer of an agent's header, a `Learner` if it learns.
-
-    TypeError for agents without a header. ValueError for an agent that has learned with action
-    masks, for SDNN-C with a history, and for running ranges in an agent that would learn.
-    """
+def _require_exportable(agent: Any, *, learns: bool) -> None:
+    """Raise ValueError for action masks, SDNN-C with a history, and running ranges that learn."""
     has_history = getattr(agent, "history", "none") not in ("none", "auto")
     expected = "have history='none', as SDNNQLambda and SDNNActorCritic alone have a history in C"
     is_possible = not has_history or isinstance(agent, SDNNQLambda | SDNNActorCritic)
@@ -132,17 +168,8 @@ def writer_of(agent: Any, name: str, fraction_bits: int | None, *, learns: bool)
         "have learned without action masks, which no C header has: it would take actions that are"
         " not allowed. Train without masks, with a reward that punishes such actions"
     )
-    require(
-        not isinstance(agent, BaseAgent) or not agent._actions.has_masks, "agent", expected, agent
-    )
-    if isinstance(agent, SDNNQLearning):
-        return (SDNNCLearner if learns else SDNNCWriter)(agent, name, fraction_bits)
-    if isinstance(agent, SDNNQLambda):
-        return (QLambdaLearner if learns else QLambdaWriter)(agent, name, fraction_bits)
-    if isinstance(agent, SDNNActorCritic):
-        return (ActorCriticLearner if learns else ActorCriticWriter)(agent, name, fraction_bits)
-    expected = "an SDNNQLearning, SDNNQLambda or SDNNActorCritic"
-    raise TypeError(f"agent must be {expected}, got {shown(agent)}")
+    has_masks = isinstance(agent, BaseAgent) and agent._actions.has_masks
+    require(not has_masks, "agent", expected, agent)
 
 
 def save_image(agent: SDNNQLearning | SDNNQLambda | SDNNActorCritic) -> bytes:

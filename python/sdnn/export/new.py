@@ -12,7 +12,7 @@ import gymnasium as gym
 from sdnn.agents import SDNNActorCritic, SDNNQLambda, SDNNQLearning
 from sdnn.approximators import LinearSDNNConfig, SDNNCConfig
 from sdnn.environments.types import Data, Space
-from sdnn.export.header import c_header
+from sdnn.export.header import writer_of
 from sdnn.export.sdnn_c import MOST_WEIGHT
 from sdnn.support.arguments import argument_error, choice, shown, whole
 
@@ -92,7 +92,8 @@ def new_agent(
         return agent_type(observation_space, action_space, **{**settings, "approximator": size})
 
     def ram_bytes_of(size: NewConfig) -> int:
-        return c_header(make_agent(size), "agent", learning=True, durations=durations).ram_bytes
+        writer = writer_of(make_agent(size), "agent", None, learns=True, durations=durations)
+        return int(writer.header().ram_bytes)
 
     sizes = _sizes(config)
     if len(sizes) == 1 and ram_bytes is None:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from sdnn._core import __version__
 from sdnn.environments.types import Array
 from sdnn.support.arguments import argument_error, path_of, require, shown
-from sdnn.support.files import write_whole
 
 _DIRECTION_BITS = 30
 _BYTES = {
@@ -41,9 +39,6 @@ class Header:
     ram_bytes: int
 
 
-AnyHeader = TypeVar("AnyHeader", bound=Header)
-
-
 def require_c_name(name: object) -> str:
     """Return ``name``; ValueError if it cannot be the prefix of names in C."""
     fits = isinstance(name, str) and re.fullmatch(r"[A-Za-z](_?[A-Za-z0-9])*", name)
@@ -56,13 +51,14 @@ def require_c_name(name: object) -> str:
     return name
 
 
-def write_header(path: str | Path, name: str | None, make: Callable[[str], AnyHeader]) -> AnyHeader:
-    """Make a header with a name, by default the file's without its ending, and write it whole."""
-    place = path_of("path", path)
-    require(not place.is_dir(), "path", f"be a file, such as {place / 'model.h'}", path)
-    header = make(place.stem if name is None else name)
-    write_whole(place, header.text.encode())
-    return header
+def header_file(path: str | Path, name: str | None) -> tuple[Path, str]:
+    """Return the file to write a header to, and the prefix of its names.
+
+    The prefix is ``name`` or, if that is None, the file's name without its ending.
+    """
+    file = path_of("path", path)
+    require(not file.is_dir(), "path", f"be a file, such as {file / 'model.h'}", path)
+    return file, file.stem if name is None else name
 
 
 def header_text(

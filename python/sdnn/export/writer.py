@@ -6,6 +6,7 @@ import json
 import math
 import zlib
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -33,6 +34,7 @@ from sdnn.export.text import (
 from sdnn.support.arguments import argument_error, whole
 
 _DEFAULT_FRACTION_BITS = 16
+_FEW_STEPS = 64  # of fixed point: a chosen number, below which a range is hardly resolved
 MOST_FRACTION_BITS = 30
 _TIES = {"lowest": "LOWEST", "middle": "MIDDLE", "uniform": "DRAWN"}
 _OF_DURATIONS = ("sdnn_durations.h", "sdnn_learn_over.h")
@@ -137,6 +139,29 @@ class Writer(ABC, Generic[Network]):
             problem = f"must be at most {most_bits}, so that {largest:g} fits 32 bits, got {bits}"
             raise argument_error("fraction_bits", problem)
         return bits
+
+    def coarse_ranges(self) -> Iterator[str]:
+        """Describe ranges of observations and actions with few values in fixed point, a line each.
+
+        Angles have none: they are directions, or turns of 64 bits.
+        """
+        agent = self.agent
+        variables = sorted({source.at[0] for source in self.inputs if source.kind == "variable"})
+        ranges = [
+            ("observation", "observe", i, *(end[i] for end in agent.observation_range))
+            for i in variables
+        ]
+        if self.box is not None:
+            bounds = zip(agent._action.low, agent._action.high, strict=True)
+            ranges += [("action", "give", i, low, high) for i, (low, high) in enumerate(bounds)]
+        for name, verb, i, low, high in ranges:
+            n_steps = float(high - low) * 2.0**self.fraction_bits
+            if n_steps < _FEW_STEPS:
+                yield (
+                    f"{name}[{i}], from {low:g} to {high:g}, has a range of only {n_steps:.2g}"
+                    f" times 2^-{self.fraction_bits}: {verb} it in another unit, or with more"
+                    " fraction_bits"
+                )
 
     def tables_of_spaces(self) -> Tables:
         """Write the constants of observations and actions."""

@@ -295,7 +295,7 @@ def test_fraction_bits_are_reduced_until_numbers_fit_32_bits():
     # 1e5 needs 17 bits and a sign, so that 14 of 32 are left; 40000 needs 16, which leaves 15.
     wide = SDNNQLearning(box(1e5, 1.0), Discrete(2), approximator=SMALL)
     assert c_header(wide, "policy").fraction_bits == 14
-    assert c_header(wide, "policy", fraction_bits=3).fraction_bits == 3
+    assert c_header(wide, "policy", fraction_bits=6).fraction_bits == 6
     refuses("fraction_bits", c_header, wide, "policy", fraction_bits=15)
     encoder = SDNNQLearning(box(1e5, 1.0), Discrete(2), angles=[0], approximator=SMALL)
     assert c_header(encoder, "policy").fraction_bits == 14

@@ -9,7 +9,7 @@ import pytest
 from refusals import refuses
 from sdnn.agents import SDNNActorCritic, SDNNQLambda, SDNNQLearning
 from sdnn.approximators import LinearSDNNConfig, SDNNCConfig
-from sdnn.export import c_header, new_agent
+from sdnn.export import c_header, export_c_header, new_agent
 
 SPACE = gym.spaces.Box(np.array([-2.0, -np.pi]), np.array([1.0, np.pi]), dtype=np.float64)
 TWO_ACTIONS = gym.spaces.Discrete(2)
@@ -198,21 +198,33 @@ def test_a_single_pattern_unit_is_refused_by_the_option_that_gave_it(refused):
     refuses("n_pattern_units", SDNNQLambda, SPACE, TWO_ACTIONS, approximator=few)
 
 
-def test_ranges_that_fixed_point_hardly_resolves_are_named(invoke):
+def test_the_command_warns_of_ranges_that_fixed_point_hardly_resolves(invoke):
     new = ("export", "--new", "--actions", 2, "--c-header", "a.h", "--range", "0:1")
     assert "warning" not in invoke(*new, "--range", "-0.01:0.01").output
     amperes = invoke(*new, "--range", "0:0.0001")
     assert amperes.exit_code == 0
     # 0.0001 2^16 = 6.55
-    assert "warning: observation[1], from 0 to 0.0001, has a range of only 6.6 times 2^-16" in (
-        amperes.output
+    expected = (
+        "warning: observation[1], from 0 to 0.0001, has a range of only 6.6 times 2^-16: observe it"
+        " in another unit, or with more --fraction-bits\n"
     )
+    assert amperes.output.count("warning") == 1
+    assert expected in amperes.stderr
     assert "warning" not in invoke(*new, "--range", "0:0.0001", "--fraction-bits", 24).output
-    motor = ("export", "--new", "--c-header", "a.h", "--range", "0:1", "--actions", "-4e-6:4e-6")
-    # 8 10^-6 2^16 = 0.524
-    assert "warning: action[0], from -4e-06 to 4e-06, has a range of only 0.52 times 2^-16" in (
-        invoke(*motor).output
-    )
-    assert "warning" not in invoke(*motor, "--fraction-bits", 24).output
     # 10^9 leaves a bit, and 2 steps from 0 to 1
     assert "observation[0], from 0 to 1," in invoke(*new, "--range", "0:1e9").output
+
+
+def test_python_warns_of_ranges_that_fixed_point_hardly_resolves(tmp_path):
+    motor = gym.spaces.Box(-4e-6, 4e-6, (1,), np.float64)
+    agent = new_agent(gym.spaces.Box(0.0, 1.0, (1,)), motor)  # no warning
+    # 8 10^-6 2^16 = 0.524
+    message = (
+        r"action\[0\], from -4e-06 to 4e-06, has a range of only 0.52 times 2\^-16: give it in"
+        " another unit, or with more fraction_bits"
+    )
+    for make in (c_header, lambda agent, name: export_c_header(agent, tmp_path / f"{name}.h")):
+        with pytest.warns(UserWarning, match=message) as warned:
+            make(agent, "motor")
+        assert [warning.filename for warning in warned] == [__file__]
+    export_c_header(agent, tmp_path / "motor.h", fraction_bits=24)  # no warning
