@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from sdnn.estimators import SDNNKernelClassifier, SDNNKernelRidge
 
 _CORRELATION_BYTES = 8  # of a struct of sdnn_kernel_estimator.h
-_MOST_INPUTS = 2**16 - 1
+_MOST_INPUTS = 2**16 - 1  # numbers of features and mixtures have 16 bits
 
 
 class KernelWriter(HeaderText):
@@ -25,6 +25,7 @@ class KernelWriter(HeaderText):
     title = "a regressor or classifier with the network's kernel"
     file = "sdnn_kernel_estimator.h"
     code_size = "2 to 3 kB"
+    remedy = "train with a smaller max_components, or with fewer features"
     model: SDNNKernelRidge | SDNNKernelClassifier
 
     def __init__(self, model: SDNNKernelRidge | SDNNKernelClassifier, name: str) -> None:
@@ -35,8 +36,8 @@ class KernelWriter(HeaderText):
         columns += range(self.n_features, self.n_features + len(self.directions))
         if self.n_features + len(self.directions) > _MOST_INPUTS:
             raise ValueError(
-                f"model must have fewer than {_MOST_INPUTS} features for a C header, got"
-                f" {self.n_features}"
+                f"model must have at most {_MOST_INPUTS} features and mixtures of features for a C"
+                f" header, got {self.n_features} and {len(self.directions)}"
             )
         codings = zip(columns, self.kernel.codings, strict=True)
         super().__init__(model, name, [coded_input(column, coding) for column, coding in codings])
@@ -53,7 +54,9 @@ class KernelWriter(HeaderText):
 
     def about(self) -> str:
         """Describe the size of the estimator."""
-        return f"{len(self.components)} samples with {len(self.inputs)} inputs"
+        n_mixtures = len(self.directions)
+        n_features = len(self.inputs) - n_mixtures
+        return f"{len(self.components)} samples of {n_features} features and {n_mixtures} mixtures"
 
     def header(self) -> EstimatorHeader:
         """Make the header."""

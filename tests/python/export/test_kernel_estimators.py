@@ -19,6 +19,18 @@ def test_outputs_in_c_are_sums_in_the_order_of_the_samples(name, target, tmp_pat
     check_kernel(name, target, tmp_path, 100, *SANITIZED)
 
 
+def test_limits_of_kernel_headers_count_samples_features_and_mixtures(monkeypatch):
+    model, _ = fitted_kernel("directions")  # of 200 samples with four features
+    n_mixtures, n_inputs = len(model.directions_), model.X_fit_.shape[1]
+    sizes = f"200 samples of {n_inputs - n_mixtures} features and {n_mixtures} mixtures"
+    assert sizes in estimator_header(model, "model").text
+    with pytest.raises(ValueError, match=f"{sizes}.* smaller max_components"):
+        estimator_header(model, "model", flash_bytes=1)
+    monkeypatch.setattr("sdnn.export.kernel_writer._MOST_INPUTS", 4)
+    with pytest.raises(ValueError, match=f"at most 4 .* mixtures .* got 4 and {n_mixtures}"):
+        estimator_header(model, "model")
+
+
 def test_kernel_estimators_do_not_learn_in_c():
     model, _ = fitted_kernel("directions")
     refuses("learning", estimator_header, model, "model", learning=True)
