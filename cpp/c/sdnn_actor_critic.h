@@ -146,7 +146,7 @@ static inline int64_t sdnn_log2_of(uint64_t x) {
   uint32_t i;
   for (; x >> 31 != 0; x >>= 1) ++exponent;
   for (; x >> 30 == 0; x <<= 1) --exponent;
-  fraction = (int64_t)((x & 1073741823) >> 10);
+  fraction = (int64_t)((x & 1073741823) >> 10); /* the 20 bits after the leading one, at 2^30 */
   for (i = 0; i < 5; ++i) logarithm = coefficients[i] + sdnn_scaled(logarithm, fraction, 20);
   return (exponent - 30) * INT64_C(1048576) + logarithm;
 }
@@ -213,6 +213,7 @@ static inline void sdnn_move_actor(sdnn_agent* agent, const sdnn_code* code, con
   }
 }
 
+/* Ends an episode for learning: traces begin anew. */
 static inline void sdnn_end(sdnn_agent* agent) {
   sdnn_end_traces(agent);
   agent->has_next = 0;

@@ -31,6 +31,7 @@ typedef uint32_t sdnn_score;
 static const sdnn_coding sdnn_the_coding = {sdnn_patterns, sdnn_modified, sdnn_modifiers,
                                             sdnn_units};
 
+/* A random number in [0, 1), of 53 bits. */
 static inline sdnn_real sdnn_uniform(sdnn_random* random) {
   return sdnn_real_of((int64_t)(sdnn_bits(random) >> 11), -53);
 }
@@ -46,7 +47,7 @@ static inline int32_t sdnn_change(uint32_t column, int32_t change) {
 #endif
 }
 
-/* A state, and the potentials of all hidden units in it, which are kept up to date. */
+/* A state, and the potentials of all hidden units in it, which learning keeps up to date. */
 typedef struct {
   sdnn_code code;
   uint32_t last_use; /* 0: there is no state */
@@ -65,12 +66,13 @@ typedef struct {
   sdnn_scale scale;
   sdnn_real progress, rate, epsilon, q_low, q_high;
 #if SDNN_ADAPTS
-  sdnn_real low, high, sum; /* of returns, and the discounted sum of rewards */
-  uint64_t n_returns, due;  /* all, and the next one that is remembered */
+  sdnn_real low, high;     /* the range of returns */
+  sdnn_real sum;           /* of the episode's rewards, each step times the discount */
+  uint64_t n_returns, due; /* all so far, and the number of the next one that is remembered */
   sdnn_real returns[256];
 #endif
   sdnn_state states[SDNN_N_STATES];
-  sdnn_transition waiting[SDNN_N_STEPS];
+  sdnn_transition pending[SDNN_N_STEPS];
   uint32_t weights[SDNN_N_WORDS]; /* of four units a word, 128 more than they are */
   int32_t thresholds[SDNN_N_UNITS];
 #if SDNN_ADAPTS
@@ -78,13 +80,14 @@ typedef struct {
   uint32_t n_rewards, n_kept_returns, oldest;
 #endif
   uint32_t latest;           /* which state was used last */
-  uint32_t n_waiting, first; /* transitions, and which is the oldest */
+  uint32_t n_pending, first; /* pending transitions, and the place of the oldest */
   uint32_t next_bins[SDNN_N_INPUTS];
   int32_t next_observation[SDNN_N_OBSERVED];
   uint32_t clock;         /* of uses of states */
   uint32_t below, above;  /* ranks of values below and above the range of counts */
-  uint32_t n_random_left; /* steps that will still be random */
-  uint32_t n_kept, kept;  /* the random action, and steps that it will still last */
+  uint32_t n_random_left; /* random steps at the beginning that are still to come */
+  uint32_t n_repeats;     /* steps in which the last random action will still be taken */
+  uint32_t repeated;      /* that action */
   uint32_t step;          /* of the episode */
 #ifdef SDNN_HOLDS
   sdnn_greedy_episode readings;
@@ -95,8 +98,9 @@ typedef struct {
 #include "sdnn_return_range.h"
 #endif
 
-/* Lists the columns in which the codes of two states differ: those to add, and from the end those
- * to subtract. A column that changes by 2 is listed twice. */
+/* Lists the columns in which the codes of two states differ: those to add from the beginning of
+ * `columns`, which has SDNN_MOST_CHANGES places, and those to subtract from its end. A column that
+ * changes by 2, from -1 to 1 or back, is listed twice. */
 static inline void sdnn_changes(const sdnn_code* from, const sdnn_code* to, sdnn_column* columns,
                                 uint32_t* n_positive, uint32_t* n_negative) {
   const sdnn_code* const codes[2] = {from, to};
@@ -122,7 +126,8 @@ static inline void sdnn_changes(const sdnn_code* from, const sdnn_code* to, sdnn
   }
 }
 
-/* Computes the potentials of a state from those of a similar state, or by all columns. */
+/* Computes the potentials of a state from its code: by the columns that differ from those of the
+ * state `from`, or by all columns if these are fewer or `from` is null. */
 static inline void sdnn_evaluate(const sdnn_agent* agent, sdnn_state* state,
                                  const sdnn_state* from) {
   sdnn_column changes[SDNN_MOST_CHANGES];
@@ -152,12 +157,13 @@ static inline void sdnn_evaluate(const sdnn_agent* agent, sdnn_state* state,
 }
 
 /* A pending transition; number 0 is the oldest. */
-static inline sdnn_transition* sdnn_waiting(sdnn_agent* agent, uint32_t i) {
+static inline sdnn_transition* sdnn_pending(sdnn_agent* agent, uint32_t i) {
   i += agent->first;
-  return &agent->waiting[i < SDNN_N_STEPS ? i : i - SDNN_N_STEPS];
+  return &agent->pending[i < SDNN_N_STEPS ? i : i - SDNN_N_STEPS];
 }
 
-/* The cached state with these bins; it replaces the least recently used one. */
+/* The cached state with these bins. A new one replaces the least recently used state that no
+ * pending transition needs; there is one, since pending transitions are fewer than states. */
 static inline sdnn_state* sdnn_state_of(sdnn_agent* agent, const uint32_t* bins) {
   const sdnn_state* const from = &agent->states[agent->latest];
   sdnn_state* chosen = 0;
@@ -170,7 +176,7 @@ static inline sdnn_state* sdnn_state_of(sdnn_agent* agent, const uint32_t* bins)
       chosen = state;
       break;
     }
-    for (j = 0; j < agent->n_waiting; ++j) is_free &= sdnn_waiting(agent, j)->state != i;
+    for (j = 0; j < agent->n_pending; ++j) is_free &= sdnn_pending(agent, j)->state != i;
     if (is_free && (!chosen || state->last_use < chosen->last_use)) chosen = state;
   }
   if (i == SDNN_N_STATES) {
@@ -183,7 +189,8 @@ static inline sdnn_state* sdnn_state_of(sdnn_agent* agent, const uint32_t* bins)
   return chosen;
 }
 
-/* Whether a potential, which is far above -2^31, is above 0. */
+/* Whether a potential is above 0: only then the highest bit of potential - 1 is 0, as potentials
+ * are far above -2^31. */
 static inline uint32_t sdnn_fires(int32_t potential) {
   return 1 - (((uint32_t)potential - 1) >> 31);
 }
@@ -196,7 +203,8 @@ static inline uint32_t sdnn_count(const sdnn_state* state, uint32_t action) {
   return n_firing;
 }
 
-/* The value of a number of firing units. */
+/* The value of a number of firing units: on the line from q_low at U_LOW units to q_high at U_HIGH
+ * units, and constant beyond its ends. */
 static inline sdnn_real sdnn_value(const sdnn_agent* agent, uint32_t n_firing) {
   const sdnn_real above = sdnn_real_of((int64_t)SDNN_U_HIGH - n_firing, 0);
   const sdnn_real below = sdnn_real_of((int64_t)n_firing - SDNN_U_LOW, 0);
@@ -221,8 +229,8 @@ static inline void sdnn_set_range(sdnn_agent* agent, sdnn_real low, sdnn_real hi
                  (uint32_t)sdnn_less(high, end);
 }
 
-/* The rank of each action's value; those of counts below and above the line are given. Returns how
- * many units fire for a best action. */
+/* Writes the rank of each action's value: `below` and `above` for counts beyond the ends of the
+ * line. Returns the number of units that fire for a best action. */
 static inline uint32_t sdnn_rank(const sdnn_state* state, uint32_t below, uint32_t above,
                                  uint32_t* ranks) {
   const int32_t* const potentials = state->potentials;
@@ -251,8 +259,10 @@ static inline sdnn_real sdnn_state_value(sdnn_agent* agent, const uint32_t* bins
   return sdnn_value(agent, sdnn_rank(state, agent->below, agent->above, ranks));
 }
 
-/* The number of units that must fire for a value; `n_firing` fire now. */
-static inline uint32_t sdnn_wanted(sdnn_agent* agent, sdnn_real value, uint32_t n_firing) {
+/* The number of units that must fire for a value, rounded by SDNN_ROUNDING_RULE; `n_firing` fire
+ * now. Rounded away from `n_firing`, a count that is whole but for 1e-9, by rounding errors, stays.
+ */
+static inline uint32_t sdnn_target_count(sdnn_agent* agent, sdnn_real value, uint32_t n_firing) {
   const sdnn_real clipped = sdnn_between(value, agent->q_low, agent->q_high);
   const sdnn_real part =
       sdnn_times(sdnn_minus(clipped, agent->q_low), sdnn_real_of(SDNN_U_HIGH - SDNN_U_LOW, 0));
@@ -274,7 +284,8 @@ static inline uint32_t sdnn_wanted(sdnn_agent* agent, sdnn_real value, uint32_t 
 }
 
 /* Moves the weights of a unit by `step` times the code, or twice that for half sums and half
- * differences. Returns whether it did: not if a weight would exceed the limit. */
+ * differences, and its threshold by -step. Returns whether it did: not if a weight would exceed the
+ * limit. The first of two passes only checks, so that nothing changes then. */
 static inline int sdnn_correct_unit(sdnn_agent* agent, const sdnn_code* code, uint32_t unit,
                                     int32_t step) {
   uint32_t* const row = agent->weights + (unit >> 2) * SDNN_N_COLUMNS;
@@ -301,7 +312,8 @@ static inline int sdnn_correct_unit(sdnn_agent* agent, const sdnn_code* code, ui
   return 1;
 }
 
-/* The products of the codes of all states with that of one, and 1 more. */
+/* The changes of the potentials of all cached states, when a unit's weights move by a code and its
+ * threshold by -1: the product of the two codes, and 1 for the threshold. */
 static inline void sdnn_products(const sdnn_agent* agent, const sdnn_code* code,
                                  int32_t* products) {
   int8_t signs[SDNN_N_COLUMNS];
@@ -358,38 +370,40 @@ static inline void sdnn_move_count(sdnn_agent* agent, sdnn_state* state, uint32_
   }
 }
 
-/* Learns the oldest pending transition; `value` is that of the state after the newest one. */
+/* Learns the oldest pending transition, with the discounted sum of all pending rewards and `value`,
+ * that of the state after the newest transition, as the target. */
 static inline void sdnn_learn_oldest(sdnn_agent* agent, sdnn_real value) {
-  const sdnn_transition* const oldest = sdnn_waiting(agent, 0);
+  const sdnn_transition* const oldest = sdnn_pending(agent, 0);
   sdnn_state* const state = &agent->states[oldest->state];
   const uint32_t action = oldest->action, n_firing = sdnn_count(state, action);
-  sdnn_real wanted;
-  uint32_t i, n_wanted;
-  for (i = agent->n_waiting; i-- > 0;) {
-    value = sdnn_plus(sdnn_real_of(sdnn_waiting(agent, i)->reward, -SDNN_FRACTION_BITS),
+  sdnn_real target;
+  uint32_t i, n_target;
+  for (i = agent->n_pending; i-- > 0;) {
+    value = sdnn_plus(sdnn_real_of(sdnn_pending(agent, i)->reward, -SDNN_FRACTION_BITS),
                       sdnn_times(SDNN_DISCOUNT, value));
   }
-  --agent->n_waiting;
+  --agent->n_pending;
   agent->first = agent->first + 1 < SDNN_N_STEPS ? agent->first + 1 : 0;
-  wanted = sdnn_plus(sdnn_times(sdnn_minus(SDNN_ONE, agent->rate), sdnn_value(agent, n_firing)),
+  target = sdnn_plus(sdnn_times(sdnn_minus(SDNN_ONE, agent->rate), sdnn_value(agent, n_firing)),
                      sdnn_times(agent->rate, value));
-  n_wanted = sdnn_wanted(agent, wanted, n_firing);
-  if (n_wanted > n_firing) sdnn_move_count(agent, state, action, n_wanted - n_firing, 1);
-  if (n_wanted < n_firing) sdnn_move_count(agent, state, action, n_firing - n_wanted, 0);
+  n_target = sdnn_target_count(agent, target, n_firing);
+  if (n_target > n_firing) sdnn_move_count(agent, state, action, n_target - n_firing, 1);
+  if (n_target < n_firing) sdnn_move_count(agent, state, action, n_firing - n_target, 0);
 }
 
+/* Learns all pending transitions; `value` is that of the state after the newest one. */
 static inline void sdnn_learn_all(sdnn_agent* agent, sdnn_real value) {
-  while (agent->n_waiting > 0) sdnn_learn_oldest(agent, value);
+  while (agent->n_pending > 0) sdnn_learn_oldest(agent, value);
 }
 
 /* Begins an episode. Call it before the first action, and whenever the task starts anew. */
 static inline void sdnn_begin_episode(sdnn_agent* agent) {
   agent->step = 0;
-  agent->n_kept = 0;
+  agent->n_repeats = 0;
 #ifdef SDNN_HOLDS
   sdnn_forget_readings(&agent->readings);
 #endif
-  if (agent->n_waiting > 0) sdnn_learn_all(agent, sdnn_state_value(agent, agent->next_bins));
+  if (agent->n_pending > 0) sdnn_learn_all(agent, sdnn_state_value(agent, agent->next_bins));
 }
 
 /* A rate that moves from `first` to `last` while the progress moves from 0 to `fraction`; it is
@@ -417,7 +431,9 @@ static inline void sdnn_set_progress(sdnn_agent* agent, uint32_t progress) {
 }
 
 #if SDNN_IS_NEW
-/* Draws weights as the library does: column by column, two bits for each unit. */
+/* Draws weights and sets thresholds as the library does: weights column by column, with two bits
+ * for each hidden unit, of which the first adds 1 and the second subtracts 1. Units that no action
+ * uses are drawn too, but not stored. */
 static inline void sdnn_draw_weights(sdnn_agent* agent) {
   sdnn_random random;
   uint32_t unit, group, at, i, j, k;
@@ -443,7 +459,8 @@ static inline void sdnn_draw_weights(sdnn_agent* agent) {
         weight = (uint32_t)(bits & 1) - (uint32_t)(bits >> 1 & 1);
         lane =
             (unit >> 2) * SDNN_N_COLUMNS + (pair - (is_double & pair)) * SDNN_N_PATTERN_UNITS + at;
-        /* Both halves of two groups; the difference is less the second. */
+        /* Paired groups have half sums and half differences of two weights: the weight of the
+         * second group counts negatively in the difference. */
         agent->weights[lane] += weight << 8 * (unit & 3);
         if (is_double & pair) weight = 0 - weight;
         if (is_double) agent->weights[lane + SDNN_N_PATTERN_UNITS] += weight << 8 * (unit & 3);
@@ -454,23 +471,24 @@ static inline void sdnn_draw_weights(sdnn_agent* agent) {
 }
 #endif
 
-/* Whether the next step takes the random action agent->kept, which is drawn here unless it is
- * being repeated. */
+/* Whether the next step takes a random action, agent->repeated: that of the last step while repeats
+ * are left, else one that is drawn. */
 static inline int sdnn_explores(sdnn_agent* agent) {
   const uint32_t step = agent->step++;
   const int at_random = agent->n_random_left > 0;
   if (at_random) --agent->n_random_left;
-  if (agent->n_kept > 0) {
-    --agent->n_kept;
+  if (agent->n_repeats > 0) {
+    --agent->n_repeats;
     return 1;
   }
   if (!at_random && !(sdnn_may_explore(step) && agent->epsilon > 0 &&
                       sdnn_less(sdnn_uniform(&agent->randoms[SDNN_EXPLORATION]), agent->epsilon))) {
     return 0;
   }
-  agent->kept = (uint32_t)sdnn_below(&agent->randoms[SDNN_EXPLORATION], SDNN_N_ACTIONS);
+  agent->repeated = (uint32_t)sdnn_below(&agent->randoms[SDNN_EXPLORATION], SDNN_N_ACTIONS);
   if (SDNN_MAX_ACTION_REPEAT > 1) {
-    agent->n_kept = sdnn_repetitions(&agent->randoms[SDNN_REPETITIONS], SDNN_MAX_ACTION_REPEAT) - 1;
+    agent->n_repeats =
+        sdnn_repetitions(&agent->randoms[SDNN_REPETITIONS], SDNN_MAX_ACTION_REPEAT) - 1;
   }
   return 1;
 }
@@ -491,7 +509,7 @@ static inline uint32_t sdnn_act(sdnn_agent* agent, const int32_t* observation) {
 #ifdef SDNN_HOLDS
   observation = sdnn_note_readings(&agent->readings, observation);
 #endif
-  if (sdnn_explores(agent)) return agent->kept;
+  if (sdnn_explores(agent)) return agent->repeated;
   sdnn_bins_of_fixed(observation, bins);
   sdnn_rank(sdnn_state_of(agent, bins), agent->below, agent->above, ranks);
   return sdnn_draw_tied(ranks, SDNN_N_ACTIONS, sdnn_highest(ranks), &agent->randoms[SDNN_ACTING]);
@@ -530,7 +548,8 @@ static inline uint32_t sdnn_greedy(const sdnn_agent* agent,
   return sdnn_tied(ranks, SDNN_N_ACTIONS, sdnn_highest(ranks));
 }
 
-/* Q(observation, action), times 2^SDNN_FRACTION_BITS, rounded to the nearest. */
+/* Q(observation, action), times 2^SDNN_FRACTION_BITS, rounded to the nearest. Values of 2^62 and
+ * more in this unit become 2^62. */
 static inline int64_t sdnn_q(const sdnn_agent* agent, const int32_t* observation, uint32_t action) {
   int32_t exponent;
   uint64_t fraction;
@@ -546,7 +565,7 @@ static inline int64_t sdnn_q(const sdnn_agent* agent, const int32_t* observation
   value =
       sdnn_value(agent, sdnn_count(&state, action < SDNN_N_ACTIONS ? action : SDNN_N_ACTIONS - 1));
   if (value << 1 == 0) return 0;
-  fraction = sdnn_fraction(value, &exponent);
+  fraction = sdnn_fraction(value, &exponent); /* below 2^53: it can be shifted by up to 9 bits */
   exponent += SDNN_FRACTION_BITS;
   if (exponent < -63) return 0;
   fraction = exponent > 9    ? UINT64_C(1) << 62
@@ -595,20 +614,20 @@ static inline void sdnn_learn(sdnn_agent* agent, const int32_t* observation, uin
 #endif
   sdnn_bins_of_fixed(next_observation, next_bins);
   next_value = terminated ? 0 : sdnn_state_value(agent, next_bins);
-  if (agent->n_waiting > 0 && !sdnn_is_next(agent, observation)) {
+  if (agent->n_pending > 0 && !sdnn_is_next(agent, observation)) {
     sdnn_learn_all(agent, sdnn_state_value(agent, agent->next_bins));
   }
   sdnn_bins_of_fixed(observation, bins);
-  newest = sdnn_waiting(agent, agent->n_waiting);
+  newest = sdnn_pending(agent, agent->n_pending);
   newest->state = (uint32_t)(sdnn_state_of(agent, bins) - agent->states);
   newest->action = action < SDNN_N_ACTIONS ? action : SDNN_N_ACTIONS - 1;
   newest->reward = reward;
-  ++agent->n_waiting;
+  ++agent->n_pending;
   sdnn_copy_32((int32_t*)agent->next_bins, (const int32_t*)next_bins, SDNN_N_INPUTS);
   sdnn_copy_32(agent->next_observation, next_observation, SDNN_N_OBSERVED);
   if (terminated) {
     sdnn_learn_all(agent, 0);
-  } else if (agent->n_waiting == SDNN_N_STEPS) {
+  } else if (agent->n_pending == SDNN_N_STEPS) {
     sdnn_learn_oldest(agent, next_value);
   }
   sdnn_end_window(&agent->scale);

@@ -1,3 +1,4 @@
+/* Learning a transition of any duration, for agents that are exported with durations. */
 #ifndef SDNN_LEARN_OVER_H
 #define SDNN_LEARN_OVER_H
 

@@ -23,7 +23,8 @@ static inline uint64_t sdnn_bits(sdnn_random* random) {
   return result;
 }
 
-/* A number below n, all with the same probability. */
+/* A number below n, all with the same probability. Of the 2^64 numbers that may be drawn, the first
+ * 2^64 modulo n are rejected, so that each rest of a division by n is left equally often. */
 static inline uint64_t sdnn_below(sdnn_random* random, uint64_t n) {
   uint64_t rejected, drawn, rest;
   sdnn_quotient(0 - n, n, &rejected);
@@ -146,7 +147,7 @@ static inline int sdnn_is_scale(const uint8_t* at) {
          headroom <= 2500;
 }
 
-/* Continues a CRC-32, which begins with 2^32 - 1 and whose complement is the checksum. */
+/* Continues the CRC-32 of zlib, which begins with 2^32 - 1 and whose complement is the checksum. */
 static inline uint32_t sdnn_add_to_checksum(uint32_t crc, const uint8_t* bytes, uint32_t n) {
   uint32_t bit;
   for (; n > 0; --n) {
@@ -162,15 +163,15 @@ typedef struct {
   uint32_t offset, n;
 } sdnn_part;
 
-/* Moves those bytes of a part that are in an array of words, which begins at `first` in the image:
- * from the array to the part or, if it reads, the other way. */
+/* Moves those bytes of a part that are in an array of 32-bit words, which begins at `first` in the
+ * image: from the array to the part or, if `reads`, from the part to the array. */
 static inline void sdnn_carry_words(const sdnn_part* part, void* words, uint32_t first,
                                     uint32_t n_words, int reads) {
   uint32_t* const array = (uint32_t*)words;
   uint32_t i;
   for (i = 0; i < part->n; ++i) {
     const uint32_t k = part->offset + i - first,
-                   shift = 8 * (k & 3); /* below `first`, k is large */
+                   shift = 8 * (k & 3); /* before `first`, k wraps to above 2^31 */
     if (k >= 4 * n_words) continue;
     if (reads) {
       const uint32_t others = array[k >> 2] & ~(UINT32_C(255) << shift);

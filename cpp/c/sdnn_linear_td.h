@@ -21,12 +21,14 @@
 #define SDNN_LARGEST_TRACE 131071
 #define SDNN_TRACE_ONE 4096
 
+/* The absolute value. */
 static inline int64_t sdnn_size(int64_t x) { return x < 0 ? -x : x; }
 static inline int64_t sdnn_clipped(int64_t x, int64_t most) {
   return x > most ? most : x < -most ? -most : x;
 }
 
-/* A rate that moves from `first` to `last`, times 2^16. */
+/* A rate, times 2^16, that moves from `first` to `last`: after n learned steps of
+ * SDNN_SCHEDULE_STEPS, S, it is first + (last - first) n / (n + S), rounded to the nearest. */
 static inline uint32_t sdnn_scheduled(const sdnn_agent* agent, int32_t first, int32_t last) {
   const int64_t all = (int64_t)last - first;
   const uint64_t twice = 2 * ((uint64_t)agent->n_learned + SDNN_SCHEDULE_STEPS);
@@ -39,7 +41,8 @@ static inline uint32_t sdnn_scheduled(const sdnn_agent* agent, int32_t first, in
   return (uint32_t)(first - 1 - (int64_t)sdnn_quotient((uint64_t)-product - 1, twice, &rest));
 }
 
-/* Makes units twice as large; the numbers that count them become half as large, halves up. */
+/* Makes the unit of values twice as large; numbers in it become half as large, halves rounded up.
+ */
 static inline void sdnn_double_unit(sdnn_agent* agent) {
   uint32_t j;
   ++agent->exponent;
@@ -143,7 +146,8 @@ static inline void sdnn_add_to_trace(int32_t* weights, int32_t* traces, const sd
 }
 
 /* Decays the trace of a row, adds the code to it unless `code` is null, and moves the weights along
- * it. Returns all bits of the sizes of the weights. */
+ * it. Returns the bits that any weight uses: x for x from 0 on, and -x - 1 for x below 0, all ORed.
+ */
 static inline uint32_t sdnn_move_row(sdnn_agent* agent, uint32_t row, const sdnn_code* code,
                                      int32_t gain, int32_t step, uint32_t shift,
                                      int32_t correction) {
@@ -154,7 +158,8 @@ static inline uint32_t sdnn_move_row(sdnn_agent* agent, uint32_t row, const sdnn
   uint32_t j;
   for (j = 0; j < SDNN_N_COLUMNS; ++j) {
     const int32_t product = traces[j] * SDNN_TRACE_DECAY;
-    traces[j] = (product + (int32_t)((uint32_t)-(product < 0) >> 19)) >> 13; /* product / 8192 */
+    /* product / 8192, rounded towards 0: to a number below 0 the shift needs 8191 added. */
+    traces[j] = (product + (int32_t)((uint32_t)-(product < 0) >> 19)) >> 13;
   }
   if (code) {
     const uint32_t n = code->n_negative;

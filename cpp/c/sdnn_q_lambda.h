@@ -41,11 +41,12 @@ typedef struct {
   int32_t reward;
   uint32_t rate, epsilon;      /* times 2^16 */
   uint32_t n_snapshots, phase; /* of the average, and steps since the last one */
-  uint32_t n_random_left;      /* steps that will still be random */
+  uint32_t n_random_left;      /* random steps left, at first or in the search for rewards */
   uint32_t n_ended;            /* episodes that terminated, up to 20 */
-  uint32_t n_kept;             /* steps that the random action, or the excursion, still lasts */
+  uint32_t n_repeats;          /* steps that the random action, or the excursion, still lasts */
   uint32_t step;               /* of the episode */
-  uint32_t kept[SDNN_N_DIMENSIONS], action[SDNN_N_DIMENSIONS];
+  uint32_t repeated[SDNN_N_DIMENSIONS]; /* the last random action, or that of an excursion */
+  uint32_t action[SDNN_N_DIMENSIONS];   /* of the pending transition */
   sdnn_states states;
 #ifdef SDNN_DURATIONS_H
   sdnn_durations durations;
@@ -54,8 +55,8 @@ typedef struct {
   uint8_t pending;    /* the code of the state of the pending transition */
   uint8_t is_pending; /* whether a transition is to be learned */
   uint8_t has_exponent;
-  uint8_t is_excursion;         /* whether n_kept counts steps of an excursion */
-  uint8_t skips_learning;       /* whether the last act was one, and its step is not learned yet */
+  uint8_t is_excursion;         /* whether n_repeats counts steps of an excursion */
+  uint8_t skips_learning;       /* whether the next step to learn is one of an excursion */
   uint8_t is_live[SDNN_N_ROWS]; /* rows of traces that are not all 0 */
 } sdnn_agent;
 
@@ -119,7 +120,8 @@ static inline uint32_t sdnn_move_rows(sdnn_agent* agent, const sdnn_code* code,
 }
 
 #if SDNN_AVERAGES
-/* Moves the average to the weights by 1 / 2^k of the way, with growing k. */
+/* Counts a step. At each SDNN_AVERAGING_INTERVAL steps, moves the average to the weights by 1 / 2^k
+ * of the way: k grows with the number n of such snapshots, to the largest with 3 (2^k - 1) <= n. */
 static inline void sdnn_note_step(sdnn_agent* agent) {
   const uint32_t interval = SDNN_AVERAGING_INTERVAL;
   int32_t* const averaged = agent->weights + SDNN_N_WEIGHTS;
@@ -148,11 +150,13 @@ static inline void sdnn_correct(sdnn_agent* agent, int64_t next) {
 #endif
 }
 
+/* Takes a step of learning, with the value of the best action in the next state. */
 static inline void sdnn_correct_by_best(sdnn_agent* agent) {
   const sdnn_code* const next = sdnn_other(agent, agent->states.next_bins);
   sdnn_correct(agent, sdnn_value(agent, next, 0, 0));
 }
 
+/* Ends an episode for learning: nothing is pending, and traces begin anew. */
 static inline void sdnn_end(sdnn_agent* agent) {
   sdnn_end_traces(agent);
   agent->is_pending = 0;
@@ -167,13 +171,14 @@ static inline void sdnn_finish_at_end(sdnn_agent* agent) {
 /* Begins an episode. Call it before the first action, and whenever the task starts anew. */
 static inline void sdnn_begin_episode(sdnn_agent* agent) {
   agent->step = 0;
-  agent->n_kept = 0;
+  agent->n_repeats = 0;
   agent->is_excursion = agent->skips_learning = 0;
   sdnn_forget(&agent->states);
   if (agent->is_pending) sdnn_finish_at_end(agent);
 }
 
-/* Whether rewards came and all were 0: random actions that last reach further than random ties. */
+/* Whether the agent has learned, but all rewards were 0. Then it searches by random actions that
+ * last, which reach further than ties that are drawn at each step. */
 static inline int sdnn_lacks_rewards(const sdnn_agent* agent) {
   return SDNN_SEARCHES && agent->n_learned > 0 && !agent->has_exponent && agent->epsilon > 0;
 }
@@ -181,7 +186,7 @@ static inline int sdnn_lacks_rewards(const sdnn_agent* agent) {
 static inline uint32_t sdnn_larger(uint32_t a, uint32_t b) { return a > b ? a : b; }
 
 #define SDNN_BEST 0
-#define SDNN_RANDOM 1 /* the action is in agent->kept */
+#define SDNN_RANDOM 1 /* the action is in agent->repeated */
 #define SDNN_WORST 2  /* on an excursion from good states, which long episodes have */
 #define SDNN_MAKES_EXCURSIONS (SDNN_SEARCHES && !SDNN_IS_SARSA)
 #define SDNN_LONG_EPISODE 2000
@@ -200,11 +205,11 @@ static inline int sdnn_kind_of_action(sdnn_agent* agent) {
   uint32_t d;
   if (step < SDNN_MOST_STEPS) ++agent->step;
   agent->skips_learning = 0;
-  if (agent->is_excursion && !may_explore) agent->n_kept = 0;
-  if (agent->n_kept == 0) agent->is_excursion = 0;
+  if (agent->is_excursion && !may_explore) agent->n_repeats = 0;
+  if (agent->n_repeats == 0) agent->is_excursion = 0;
   if (is_left) --agent->n_random_left;
-  if (agent->n_kept > 0) {
-    --agent->n_kept;
+  if (agent->n_repeats > 0) {
+    --agent->n_repeats;
     agent->skips_learning = agent->is_excursion;
     return agent->is_excursion ? SDNN_WORST : SDNN_RANDOM;
   }
@@ -218,18 +223,18 @@ static inline int sdnn_kind_of_action(sdnn_agent* agent) {
                           sdnn_below(repetitions, SDNN_DRAWS_FOR_EXCURSION) == 0;
     if (agent->is_excursion) {
       agent->skips_learning = 1;
-      agent->n_kept = (uint32_t)sdnn_below(repetitions, longest);
+      agent->n_repeats = (uint32_t)sdnn_below(repetitions, longest);
       return SDNN_WORST;
     }
   }
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
-    agent->kept[d] = (uint32_t)sdnn_below(&agent->randoms[SDNN_EXPLORATION], sdnn_n_actions[d]);
+    agent->repeated[d] = (uint32_t)sdnn_below(&agent->randoms[SDNN_EXPLORATION], sdnn_n_actions[d]);
   }
   if (SDNN_SEARCHES && at_random && SDNN_START_STEPS == 0) {
-    agent->n_kept = (uint32_t)sdnn_below(&agent->randoms[SDNN_REPETITIONS],
-                                         (uint64_t)SDNN_MAX_ACTION_REPEAT / 2);
+    agent->n_repeats = (uint32_t)sdnn_below(&agent->randoms[SDNN_REPETITIONS],
+                                            (uint64_t)SDNN_MAX_ACTION_REPEAT / 2);
   } else if (SDNN_MAX_ACTION_REPEAT > 1) {
-    agent->n_kept = sdnn_repetitions(&agent->randoms[SDNN_REPETITIONS], longest) - 1;
+    agent->n_repeats = sdnn_repetitions(&agent->randoms[SDNN_REPETITIONS], longest) - 1;
   }
   return SDNN_RANDOM;
 }
@@ -263,7 +268,7 @@ static inline void sdnn_act_in_each(sdnn_agent* agent, const int32_t* observatio
   }
   choice = sdnn_kind_of_action(agent);
   if (choice == SDNN_RANDOM) {
-    for (d = 0; d < SDNN_N_DIMENSIONS; ++d) action[d] = agent->kept[d];
+    for (d = 0; d < SDNN_N_DIMENSIONS; ++d) action[d] = agent->repeated[d];
     if (SDNN_REMEMBERS) {
       sdnn_read_to_act(&agent->states, observation, bins);
       sdnn_note_act(&agent->states, action);
@@ -275,7 +280,7 @@ static inline void sdnn_act_in_each(sdnn_agent* agent, const int32_t* observatio
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) {
     sdnn_sums(agent->weights, code, d, sums);
     if (choice == SDNN_WORST) {
-      action[d] = agent->kept[d] = sdnn_smallest_of(sums, sdnn_n_actions[d]);
+      action[d] = agent->repeated[d] = sdnn_smallest_of(sums, sdnn_n_actions[d]);
       continue;
     }
     least = sdnn_largest(sums, sdnn_n_actions[d]) - sdnn_tie_tolerance(agent->exponent);
@@ -317,7 +322,7 @@ static inline int sdnn_skips(sdnn_agent* agent, const uint32_t* action) {
   uint32_t d;
   agent->skips_learning = 0;
   for (d = 0; skips && d < SDNN_N_DIMENSIONS; ++d) {
-    if (action[d] != agent->kept[d]) return 0;
+    if (action[d] != agent->repeated[d]) return 0;
   }
   return skips;
 }

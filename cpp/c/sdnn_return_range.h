@@ -1,15 +1,17 @@
+/* The range of values, estimated from recent returns. The class ReturnRange of
+ * cpp/include/sdnn/agents/return_range.hpp says why, and has the same numbers. */
 #ifndef SDNN_RETURN_RANGE_H
 #define SDNN_RETURN_RANGE_H
 
 #include "sdnn_real.h"
 
-/* The range of values follows the returns of late: see cpp/include/sdnn/agents/return_range.hpp. */
 #define SDNN_MOST UINT64_C(0x7e37e43c8800759c) /* 1e300 */
 
 static inline sdnn_real sdnn_clipped(sdnn_real x) {
   return sdnn_between(x, SDNN_MOST | SDNN_MINUS, SDNN_MOST);
 }
 
+/* A quarter of a - b. */
 static inline sdnn_real sdnn_quarter(sdnn_real a, sdnn_real b) {
   return sdnn_times(UINT64_C(1021) << 52, sdnn_minus(a, b));
 }
@@ -20,8 +22,9 @@ static inline void sdnn_copy_returns(sdnn_real* to, const sdnn_real* from, uint3
   for (; n > 0; --n) *target++ = *from++;
 }
 
-/* Grows by a quarter more than it must. */
-static inline int sdnn_hold(sdnn_agent* agent, sdnn_real sum) {
+/* Extends the range to a sum outside of it, and by a quarter of its new width more. Returns whether
+ * it did. */
+static inline int sdnn_extend_range(sdnn_agent* agent, sdnn_real sum) {
   if (sdnn_less(agent->high, sum)) {
     agent->high = sdnn_plus(sum, sdnn_quarter(sum, agent->low));
   } else if (sdnn_less(sum, agent->low)) {
@@ -32,7 +35,9 @@ static inline int sdnn_hold(sdnn_agent* agent, sdnn_real sum) {
   return 1;
 }
 
-/* Notes the first returns of the rewards that wait. */
+/* Computes the returns of the first `n_known` rewards, backwards from the last reward, and
+ * remembers those that are due. Unless `are_all`, because the episode has terminated, the rest that
+ * is missing of a return is assumed to be like its known part. */
 static inline void sdnn_note_returns(sdnn_agent* agent, uint32_t n_known, int are_all) {
   const sdnn_real width = agent->n_returns < 32 ? SDNN_MOST : sdnn_minus(agent->high, agent->low);
   const sdnn_real low = sdnn_clipped(sdnn_minus(agent->low, width));
@@ -56,7 +61,7 @@ static inline void sdnn_note_returns(sdnn_agent* agent, uint32_t n_known, int ar
   }
 }
 
-/* The return that n are below; with a sign, above. */
+/* The return that n remembered ones are below or, if `sign` is SDNN_MINUS, above. */
 static inline sdnn_real sdnn_return_above(const sdnn_agent* agent, uint32_t n, uint64_t sign) {
   sdnn_real least[14]; /* n is at most 256 / 20 */
   uint32_t i, j;
@@ -102,7 +107,7 @@ static inline int sdnn_note_reward(sdnn_agent* agent, int32_t reward, int termin
   agent->sum = sdnn_clipped(
       sdnn_plus(sdnn_real_of(reward, -SDNN_FRACTION_BITS), sdnn_times(SDNN_DISCOUNT, agent->sum)));
   grows = (agent->n_returns < 32 || !sdnn_less(agent->low, agent->high)) &&
-          sdnn_hold(agent, agent->sum);
+          sdnn_extend_range(agent, agent->sum);
   if (terminated) agent->sum = 0;
   agent->rewards[agent->n_rewards++] = reward;
   if (!terminated && agent->n_rewards < 2 * SDNN_HORIZON) return grows;
