@@ -103,24 +103,12 @@ static inline sdnn_real sdnn_position_of_knots(const sdnn_real* knots, uint32_t 
 #endif
 
 #if SDNN_HAS_CIRCLES
-/* The largest integer that is not above x. Exponents of doubles have a bias of 1023; from 2^52
- * on all numbers are integers. */
-static inline sdnn_real sdnn_floor(sdnn_real x) {
-  const uint32_t exponent = (uint32_t)(x >> 52 & 2047);
-  uint64_t rest;
-  if (exponent >= 1075) return x;
-  if (exponent < 1023) return x >> 63 && x << 1 != 0 ? SDNN_ONE | SDNN_MINUS : 0;
-  rest = x & ((UINT64_C(1) << (1075 - exponent)) - 1);
-  x -= rest;
-  return x >> 63 && rest != 0 ? sdnn_minus(x, SDNN_ONE) : x;
-}
-
-/* The bin of a number that repeats: `values` are the beginning of a turn and its length. */
+/* The bin of a number on a circle: `values` are the beginning of a turn and its length. */
 static inline uint32_t sdnn_bin_on_circle(const sdnn_real* values, uint32_t n_bins, sdnn_real x) {
   const sdnn_real digits = sdnn_real_of(1000000000, 0), shift = sdnn_real_of(1, 52);
   sdnn_real turns, place;
   uint32_t bin;
-  if ((x & ~SDNN_MINUS) >> 52 >= 1023 + 500) return 0; /* a whole number of turns */
+  if ((x & ~SDNN_MINUS) >> 52 >= 1023 + 500) return 0; /* from 2^500 on: whole turns */
   turns = sdnn_over(sdnn_minus(x, values[0]), values[1]);
   place = sdnn_times(sdnn_minus(turns, sdnn_floor(turns)), sdnn_real_of(n_bins, 0));
   /* Rounded to nine decimals; an addition of 2^52 rounds to integers. */

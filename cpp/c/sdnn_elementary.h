@@ -1,4 +1,4 @@
-/* Rounding and elementary functions of real numbers, with the bits of std::floor, std::round and
+/* Rounding and elementary functions of real numbers, with the bits of std::round and
  * cpp/include/sdnn/core/elementary.hpp. */
 #ifndef SDNN_ELEMENTARY_H
 #define SDNN_ELEMENTARY_H
@@ -9,20 +9,6 @@
 #define SDNN_TWO (UINT64_C(1024) << 52)
 #define SDNN_PI UINT64_C(0x400921fb54442d18)
 #define SDNN_TWO_PI UINT64_C(0x401921fb54442d18)
-
-/* A number without its fraction, towards 0. */
-static inline sdnn_real sdnn_truncated(sdnn_real x) {
-  const uint32_t exponent = (uint32_t)(x >> 52 & 2047);
-  if (exponent < 1023) return x & SDNN_MINUS;
-  if (exponent >= 1075) return x;
-  return x >> (1075 - exponent) << (1075 - exponent);
-}
-
-/* The largest integer that is not above a number. */
-static inline sdnn_real sdnn_floor(sdnn_real x) {
-  const sdnn_real truncated = sdnn_truncated(x);
-  return x >> 63 && truncated != x ? sdnn_minus(truncated, SDNN_ONE) : truncated;
-}
 
 /* The nearest integer, halves away from 0. */
 static inline sdnn_real sdnn_nearest(sdnn_real x) {

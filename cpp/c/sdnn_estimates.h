@@ -15,6 +15,7 @@ typedef int64_t sdnn_total;
 #define SDNN_COUNTS_UNITS 0
 #endif
 
+/* The mean of a total over the networks. */
 static inline sdnn_real sdnn_mean(sdnn_total total) {
   const sdnn_real sum = sdnn_real_of(total, 0);
   return SDNN_N_NETWORKS == 1 ? sum : sdnn_over(sum, sdnn_real_of(SDNN_N_NETWORKS, 0));
@@ -22,11 +23,12 @@ static inline sdnn_real sdnn_mean(sdnn_total total) {
 
 #if !SDNN_IS_CLASSIFIER
 
-/* The change of an output per unit, of the range (low, high) of the output. */
+/* The change of an output for each firing unit; `range` has its lowest and highest value. */
 static inline sdnn_real sdnn_step(const sdnn_real* range) {
   return sdnn_over(sdnn_minus(range[1], range[0]), sdnn_real_of(SDNN_COUNTS_OF_RANGE, 0));
 }
 
+/* The output that a total stands for. */
 static inline sdnn_real sdnn_output(const sdnn_real* range, sdnn_total total) {
   return sdnn_plus(sdnn_times(sdnn_step(range), sdnn_mean(total)), range[0]);
 }
@@ -34,7 +36,9 @@ static inline sdnn_real sdnn_output(const sdnn_real* range, sdnn_total total) {
 #else
 
 #if SDNN_IS_ONE_VS_ONE
-/* The votes of the units of pairs of classes; their potentials break ties. */
+/* Writes the score of each class: its votes, plus s / (3 (|s| + 1)) of the sum s of its margins,
+ * which breaks ties as scikit-learn's one-versus-one classifiers do. A pair's unit, with a margin
+ * above 0, votes for the first class, else for the second. */
 static inline void sdnn_scores_of(const sdnn_total* totals, sdnn_real* scores) {
   const sdnn_real half = sdnn_real_of(1, -1);
   sdnn_real sums[SDNN_N_CLASSES];
@@ -60,6 +64,7 @@ static inline void sdnn_scores_of(const sdnn_total* totals, sdnn_real* scores) {
 #endif
 }
 #else
+/* Writes the score of each class: the part of its units that fire, or the potential of its unit. */
 static inline void sdnn_scores_of(const sdnn_total* totals, sdnn_real* scores) {
   uint32_t i;
   for (i = 0; i < SDNN_N_CLASSES; ++i) {

@@ -69,8 +69,8 @@ static inline void sdnn_add_totals(const sdnn_network* network, const uint32_t* 
   }
 }
 
-/* Returns whether every value of a sample has a bin. */
-static inline int sdnn_totals_of(const double* x, sdnn_total* totals) {
+/* Writes the totals for a sample. Returns whether every value has a bin. */
+static inline int sdnn_predicted_totals(const double* x, sdnn_total* totals) {
   uint32_t bins[SDNN_N_INPUTS], i;
   sdnn_code code;
   if (!sdnn_bins_of(x, bins)) return 0;
@@ -80,40 +80,9 @@ static inline int sdnn_totals_of(const double* x, sdnn_total* totals) {
   return 1;
 }
 
-#if !SDNN_IS_CLASSIFIER
-
-/* Writes the outputs of a sample. Returns 0, and writes nothing, for a sample that is refused: with
- * infinity, an unknown category or a missing value for which the estimator has no pattern. */
-static inline int sdnn_predict(const double* x, double* y) {
-  sdnn_total totals[SDNN_N_GROUPS];
-  uint32_t i;
-  if (!sdnn_totals_of(x, totals)) return 0;
-  for (i = 0; i < SDNN_N_GROUPS; ++i) {
-    y[i] = sdnn_double_of(sdnn_output(sdnn_ranges + 2 * i, totals[i]));
-  }
-  return 1;
-}
-
-#else
-
-/* The number of a sample's class, or -1 for a sample that is refused: with infinity, an unknown
- * category or a missing value for which the estimator has no pattern. */
-static inline int32_t sdnn_predict(const double* x) {
-  sdnn_total totals[SDNN_N_GROUPS];
-  return sdnn_totals_of(x, totals) ? sdnn_class_of(totals) : -1;
-}
-
-/* Writes the scores of the classes. Returns 0, and writes nothing, for a sample that is refused. */
-static inline int sdnn_scores(const double* x, double* scores) {
-  sdnn_total totals[SDNN_N_GROUPS];
-  sdnn_real bits[SDNN_N_CLASSES];
-  uint32_t i;
-  if (!sdnn_totals_of(x, totals)) return 0;
-  sdnn_scores_of(totals, bits);
-  for (i = 0; i < SDNN_N_CLASSES; ++i) scores[i] = sdnn_double_of(bits[i]);
-  return 1;
-}
-
-#endif
+#define SDNN_MODEL_PARAMETER
+#define SDNN_MODEL
+#define SDNN_RANGES sdnn_ranges
+#include "sdnn_predictions.h"
 
 #endif /* SDNN_GREEDY_ESTIMATOR_H */

@@ -107,8 +107,14 @@ static inline int sdnn_outputs_of(const double* x, sdnn_real* outputs) {
   return 1;
 }
 
-/* Writes the outputs for a sample x; returns 0 if it is impossible. */
-static inline int sdnn_write_outputs(const double* x, double* y) {
+/* Writes the outputs of a sample, or the scores of the classes. Returns 0, and writes nothing, for
+ * a sample that is refused: with infinity, an unknown category or a missing value for which the
+ * estimator has no pattern. */
+#if SDNN_IS_CLASSIFIER
+static inline int sdnn_scores(const double* x, double* y) {
+#else
+static inline int sdnn_predict(const double* x, double* y) {
+#endif
   sdnn_real outputs[SDNN_N_SUMS];
   uint32_t k;
   if (!sdnn_outputs_of(x, outputs)) return 0;
@@ -116,20 +122,7 @@ static inline int sdnn_write_outputs(const double* x, double* y) {
   return 1;
 }
 
-#if !SDNN_IS_CLASSIFIER
-
-/* Writes the outputs of a sample. Returns 0, and writes nothing, for a sample that is refused: with
- * infinity, an unknown category or a missing value for which the estimator has no pattern. */
-static inline int sdnn_predict(const double* x, double* y) { return sdnn_write_outputs(x, y); }
-
-#else
-
-/* Writes the scores of the classes. Returns 0, and writes nothing, for a sample that is refused:
- * with infinity, an unknown category or a missing value for which the estimator has no pattern. */
-static inline int sdnn_scores(const double* x, double* scores) {
-  return sdnn_write_outputs(x, scores);
-}
-
+#if SDNN_IS_CLASSIFIER
 /* The number of a sample's class, or -1 for a sample that is refused. */
 static inline int32_t sdnn_predict(const double* x) {
   sdnn_real scores[SDNN_N_CLASSES];
@@ -140,7 +133,6 @@ static inline int32_t sdnn_predict(const double* x) {
   }
   return (int32_t)best;
 }
-
 #endif
 
 #endif /* SDNN_KERNEL_ESTIMATOR_H */

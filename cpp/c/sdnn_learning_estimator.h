@@ -83,7 +83,7 @@ static inline void sdnn_totals_of(const int32_t* potentials, sdnn_total* totals)
 #endif
 }
 
-/* Returns whether every value of a sample has a bin. */
+/* Encodes a sample and computes the units' potentials. Returns whether every value has a bin. */
 static inline int sdnn_read(const sdnn_model* model, const double* x, sdnn_code* code,
                             int32_t* potentials) {
   uint32_t bins[SDNN_N_INPUTS];
@@ -93,7 +93,7 @@ static inline int sdnn_read(const sdnn_model* model, const double* x, sdnn_code*
   return 1;
 }
 
-/* The totals for a sample; returns whether every value has a bin. */
+/* Writes the totals for a sample. Returns whether every value has a bin. */
 static inline int sdnn_predicted_totals(const sdnn_model* model, const double* x,
                                         sdnn_total* totals) {
   int32_t potentials[SDNN_N_UNITS];
@@ -102,6 +102,11 @@ static inline int sdnn_predicted_totals(const sdnn_model* model, const double* x
   sdnn_totals_of(potentials, totals);
   return 1;
 }
+
+#define SDNN_MODEL_PARAMETER const sdnn_model *model,
+#define SDNN_MODEL model,
+#define SDNN_RANGES model->ranges
+#include "sdnn_predictions.h"
 
 /* Whether a sample may be learned as far as its numbers are within their ranges. */
 static inline int sdnn_is_within(const double* x) {
@@ -222,18 +227,6 @@ static inline int sdnn_learn_targets(sdnn_model* model, const sdnn_code* code,
 
 #if !SDNN_IS_CLASSIFIER
 
-/* Writes the outputs of a sample. Returns 0, and writes nothing, for a sample that is refused: with
- * infinity, an unknown category or a missing value for which the estimator has no pattern. */
-static inline int sdnn_predict(const sdnn_model* model, const double* x, double* y) {
-  sdnn_total totals[SDNN_N_GROUPS];
-  uint32_t i;
-  if (!sdnn_predicted_totals(model, x, totals)) return 0;
-  for (i = 0; i < SDNN_N_GROUPS; ++i) {
-    y[i] = sdnn_double_of(sdnn_output(model->ranges + 2 * i, totals[i]));
-  }
-  return 1;
-}
-
 #define SDNN_EXPONENT(x) ((x) >> 52 & 2047)
 #define SDNN_FURTHEST (UINT64_C(2023) << 52) /* 2^1000 */
 
@@ -312,24 +305,6 @@ static inline int sdnn_learn(sdnn_model* model, const double* x, const double* y
 }
 
 #else
-
-/* The number of a sample's class, or -1 for a sample that is refused: with infinity, an unknown
- * category or a missing value for which the estimator has no pattern. */
-static inline int32_t sdnn_predict(const sdnn_model* model, const double* x) {
-  sdnn_total totals[SDNN_N_GROUPS];
-  return sdnn_predicted_totals(model, x, totals) ? sdnn_class_of(totals) : -1;
-}
-
-/* Writes the scores of the classes. Returns 0, and writes nothing, for a sample that is refused. */
-static inline int sdnn_scores(const sdnn_model* model, const double* x, double* scores) {
-  sdnn_total totals[SDNN_N_GROUPS];
-  sdnn_real bits[SDNN_N_CLASSES];
-  uint32_t i;
-  if (!sdnn_predicted_totals(model, x, totals)) return 0;
-  sdnn_scores_of(totals, bits);
-  for (i = 0; i < SDNN_N_CLASSES; ++i) scores[i] = sdnn_double_of(bits[i]);
-  return 1;
-}
 
 #if !SDNN_COUNTS_UNITS
 /* The perceptron rule: corrects every unit on the wrong side for a class. */

@@ -1,16 +1,22 @@
+/* Real numbers: the 64 bits of IEEE 754, calculated in integers and rounded to the nearest, ties to
+ * even. So they are the library's on every processor and with all options of a compiler. There are
+ * no infinities and no NaN.
+ *
+ * The bits are a sign, 11 of the exponent e and 52 of the fraction f: the number is
+ * (2^52 + f) 2^(e - 1075), or f 2^-1074 if e is 0. For x other than 0, x << 1 is above 0, and among
+ * positive numbers the larger one has the larger bits. */
 #ifndef SDNN_REAL_H
 #define SDNN_REAL_H
 
 #include <stdint.h>
 
-/* Real numbers: the 64 bits of IEEE 754, calculated in integers and rounded to the nearest, ties to
- * even. So they are the library's on every processor and with all options of a compiler. There are
- * no infinities and no NaN. */
 typedef uint64_t sdnn_real;
 #define SDNN_MINUS (UINT64_C(1) << 63)
 #define SDNN_ONE (UINT64_C(1023) << 52)
 
-/* fraction 2^exponent with a sign; the lowest bit is also set where less than that is left over. */
+/* The number fraction 2^exponent with a sign, rounded. The lowest bit of the fraction must be 1 if
+ * there was a rest below it, so that the fraction does not look like a tie. It is shifted to 63
+ * bits here: 53 that are kept, with the leading one, and 10 that round. */
 static inline sdnn_real sdnn_rounded(uint64_t sign, uint64_t fraction, int32_t exponent) {
   uint64_t shift;
   if (fraction == 0) return sign;
@@ -32,6 +38,7 @@ static inline sdnn_real sdnn_rounded(uint64_t sign, uint64_t fraction, int32_t e
   return sign | (((uint64_t)(exponent - 1) << 52) + fraction);
 }
 
+/* value 2^exponent. */
 static inline sdnn_real sdnn_real_of(int64_t value, int32_t exponent) {
   return value < 0 ? sdnn_rounded(SDNN_MINUS, 0 - (uint64_t)value, exponent)
                    : sdnn_rounded(0, (uint64_t)value, exponent);
@@ -113,11 +120,26 @@ static inline int sdnn_less(sdnn_real a, sdnn_real b) {
   return a >> 63 ? b < a : a < b;
 }
 
+/* The number x, limited to the range from `low` to `high`. */
 static inline sdnn_real sdnn_between(sdnn_real x, sdnn_real low, sdnn_real high) {
   return sdnn_less(x, low) ? low : sdnn_less(high, x) ? high : x;
 }
 
-/* The largest integer that is not above a number from 0 to 2^31. */
+/* A number without its fraction, towards 0. From 2^52 on, of the exponent 1075, it has none. */
+static inline sdnn_real sdnn_truncated(sdnn_real x) {
+  const uint32_t exponent = (uint32_t)(x >> 52 & 2047);
+  if (exponent < 1023) return x & SDNN_MINUS;
+  if (exponent >= 1075) return x;
+  return x >> (1075 - exponent) << (1075 - exponent);
+}
+
+/* The largest integer that is not above a number, as a real number. */
+static inline sdnn_real sdnn_floor(sdnn_real x) {
+  const sdnn_real truncated = sdnn_truncated(x);
+  return x >> 63 && truncated != x ? sdnn_minus(truncated, SDNN_ONE) : truncated;
+}
+
+/* The largest integer that is not above a number from 0 to 2^31, as an integer. */
 static inline int32_t sdnn_whole(sdnn_real x) {
   const uint32_t shift = 1075 - (uint32_t)(x >> 52 & 2047);
   return shift > 52 ? 0 : (int32_t)(((x & ((UINT64_C(1) << 52) - 1)) | UINT64_C(1) << 52) >> shift);

@@ -25,16 +25,15 @@ class ThermometerCode(Code):
     def __init__(
         self, network: _core.LinearSDNN, inputs: list[int], n_inputs: int, *, n_unread_bins: int
     ) -> None:
+        super().__init__(network, n_inputs)
         self.n_unread_bins = n_unread_bins
         """Bins of an input that stand for missing readings."""
-        self.thermometers: list[int] = []
-        self.n_units = 0
-        super().__init__(network, n_inputs)
         self.n_pair_slots = len(self.groups) * rounded_up(self.m, 64)
         """Columns of the groups in the agent's weights, where each fills whole words."""
         n_thermometer_columns = network.weights().shape[1] - self.n_pair_slots
-        if n_thermometer_columns:
-            self.thermometers, self.n_units = inputs, n_thermometer_columns // len(inputs)
+        self.thermometers = inputs if n_thermometer_columns else []
+        self.n_units: int = n_thermometer_columns // max(len(inputs), 1)
+        """Columns of a thermometer."""
 
     @property
     def n_thermometer_columns(self) -> int:
@@ -52,9 +51,9 @@ class ThermometerCode(Code):
         return super().most_columns + self.n_thermometer_columns
 
     def defines(self) -> dict[str, int]:
-        """Return the sizes of a code."""
+        """Return the macros with the sizes of the code."""
         bins = [len(self.network.table(i)) - self.n_unread_bins for i in self.thermometers]
-        return {
+        return {  # a last bin of at least 1, since C divides by it
             **super().defines(),
             "N_COLUMNS": self.n_columns,
             "N_THERMOMETERS": len(self.thermometers),
@@ -77,9 +76,8 @@ class ActorCriticWriter(LinearWriter):
         """Return the code of its states."""
         inputs = [*self.inputs, *self.history.added]
         variables = [i for i, source in enumerate(inputs) if source.kind == "variable"]
-        return ThermometerCode(
-            self.network, variables, self.n_inputs, n_unread_bins=int(self.codes_missing)
-        )
+        n_unread_bins = int(self.codes_missing)
+        return ThermometerCode(self.network, variables, self.n_inputs, n_unread_bins=n_unread_bins)
 
     @property
     def action_window(self) -> int:
@@ -92,7 +90,7 @@ class ActorCriticWriter(LinearWriter):
         return self.box is not None
 
     def columns(self) -> NDArray[np.intp]:
-        """Return which columns of the agent's weights the header has, in the header's order."""
+        """Return the indices of the header's columns among those of the agent's weights."""
         code = self.code()
         thermometers = code.n_pair_slots + np.arange(code.n_thermometer_columns)
         return np.concatenate([super().columns(), thermometers])
@@ -105,7 +103,7 @@ class ActorCriticWriter(LinearWriter):
         return tables
 
     def defines(self) -> Data:
-        """Return the sizes of the readout."""
+        """Return the macros of the readout; see `SoftmaxPolicy` for the bits of a preference."""
         n_slots = self.network.weights().shape[1]
         n_unit_bits = min(40, 16 + (n_slots // 4).bit_length())
         return {
@@ -139,22 +137,15 @@ class ActorCriticWriter(LinearWriter):
         ]
 
     def weights(self, state: Data) -> NDArray[np.int32]:
-        """Return the weights of the critic and of the actor, as the header has them."""
-        rows = np.concatenate([state[_CRITIC], state[_ACTOR]])
-        weights: NDArray[np.int32] = rows[1 - self.n_critic_rows :, self.columns()]
+        """Return the weights of the header, (n_rows, n_columns); a policy has no critic's."""
+        rows = np.concatenate([state[_CRITIC][: self.n_critic_rows], state[_ACTOR]])
+        weights: NDArray[np.int32] = rows[:, self.columns()]
         return weights
 
     def header(self) -> CHeader:
-        """Make the header."""
-        tables, code, n_weights = self.tables(), self.code(), self.n_weights()
-        tables.add("int32_t", "weights", self.weights(self.agent._state_of("agent")).reshape(-1))
-        ram_bytes = code.most_columns * code.column_bytes + 12 * max(self.n_rows())
-        ram_bytes += 12 * self.n_inputs + self.history_bytes()
-        n_words = min(code.most_columns, code.n_columns) * sum(self.n_rows())
-        sizes = {"weight_bytes": 4 * n_weights, "ram_bytes": ram_bytes, "n_words": n_words}
-        description, needs = self.description(), self.needs(**sizes)
-        file = "sdnn_greedy_actor_critic.h"
-        return self.write(file, description, needs, self.defines(), tables, **sizes)
+        """Make the header; an action has a preference of 8 bytes and a probability of 4."""
+        weights = self.weights(self.agent._state_of("agent"))
+        return self.write_policy("sdnn_greedy_actor_critic.h", weights, self.defines(), 12)
 
 
 class ActorCriticLearner(Learner[_core.LinearSDNN], ActorCriticWriter):
@@ -169,7 +160,7 @@ class ActorCriticLearner(Learner[_core.LinearSDNN], ActorCriticWriter):
         self.history.follows_ranges = follows_ranges(agent)
 
     def fields(self) -> list[Field]:
-        """Return the fields of an image: names, types and shapes."""
+        """Return names, types and shapes of an image."""
         shape = self.n_critic_rows + sum(self.n_rows()), self.code().n_columns
         return [
             ("action_value.exponent", "<i4"),
@@ -184,18 +175,18 @@ class ActorCriticLearner(Learner[_core.LinearSDNN], ActorCriticWriter):
         ]
 
     def remembered(self, state: Data) -> Data:
-        """Return the fields that are not the same in the core's state."""
+        """Return the fields that are not in the core's state, or differ there."""
         moments = self.agent._state_of("observations") if self._moments() else {}
         return {"action_value.exponent": NONE, **state, **moments, "weights": self.weights(state)}
 
     def _moments(self) -> list[Field]:
-        """Return the fields of running ranges."""
+        """Return the fields of the moments of running ranges; none without such ranges."""
         if not self.history.follows_ranges:
             return []
         return [(f"running.{name}", c, (self.n_observed,)) for name, c in MOMENTS.items()]
 
     def recall(self, image: Array, state: Data) -> None:
-        """Put the fields of an image into the core's state; the episode before is over."""
+        """Write the fields of an image into the core's state, in which a new episode begins."""
         for name in ("old_value", "has_acted"):
             state[name] = np.zeros_like(state[name])
         for name in ("trace.values", "actor_trace.values", "next_state", "mask"):

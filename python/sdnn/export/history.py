@@ -14,7 +14,6 @@ from sdnn.export.text import Input, Tables, bits_of, real_number, rounded_up
 
 _OF_HISTORY = ("sdnn_history.h", "sdnn_history_learner.h")
 _SINGLE = ("sdnn_single_observations.h", "sdnn_last_bins.h", "sdnn_last_observation.h")
-_RUNNING = "sdnn_running_ranges.h"
 _OF_HELD = ("sdnn_readings.h", "sdnn_held_observations.h")
 _DIGITS = {"float64": (53, -1074), "float32": (24, -149), "float16": (11, -24), "whole": (0, 0)}
 """Binary digits of the numbers of a Box, and the exponent of their least bit; 0: whole numbers."""
@@ -58,23 +57,27 @@ class StateHistory:
     @property
     def unused_files(self) -> Sequence[str]:
         """The C files that its header does not need."""
-        without = ["sdnn_policy.h" if self.has_episodes else "sdnn_episode_policy.h"]
-        if self.has_episodes or self.follows_ranges:
-            without += _SINGLE
-        if not self.follows_ranges:
-            without.append(_RUNNING)
-        without += ["sdnn_float_bins.h"] if self.has_real_inputs else ()
-        without += () if self.is_needed else _OF_HISTORY
-        return [*without, *(() if self.holds and not self.is_needed else _OF_HELD)]
+        is_needed = {
+            ("sdnn_policy.h",): not self.has_episodes,
+            ("sdnn_episode_policy.h",): self.has_episodes,
+            _SINGLE: not (self.has_episodes or self.follows_ranges),
+            ("sdnn_running_ranges.h",): self.follows_ranges,
+            ("sdnn_float_bins.h",): not self.has_real_inputs,
+            _OF_HISTORY: self.is_needed,
+            _OF_HELD: self.holds and not self.is_needed,
+        }
+        return [file for files, needed in is_needed.items() if not needed for file in files]
 
     @property
     def added(self) -> list[Input]:
-        """The inputs of a state beside those of the observation, with those that they describe."""
-        n = {"differences": 1, "averages": 2}.get(self.kind, 0) if self.is_needed else 0
-        sources = [self.inputs[i] for i in self.numbers]
+        """The inputs that a state has beside those of its observation.
+
+        These are the differences of all numbers, or all fast averages and then all slow ones.
+        """
+        numbers = [self.inputs[i] for i in self.numbers]
         if self.kind == "differences":  # the change of an angle is no angle
-            sources = [replace(source, kind="variable") for source in sources]
-        return sources * n
+            return [replace(number, kind="variable") for number in numbers]
+        return 2 * numbers if self.kind == "averages" else []
 
     @property
     def n_remembered(self) -> int:
@@ -105,8 +108,9 @@ class StateHistory:
         An input of kind "angle" is atan2 of two readings. An observer also takes sine and cosine of
         these, and of readings that are angles themselves ("circular").
         """
-        has_kinds = self.has_real_inputs
-        kinds = {source.kind for source in self.inputs} if has_kinds else set[str]()
+        if not self.has_real_inputs:
+            return 0
+        kinds = {source.kind for source in self.inputs}
         n_numbers = 23 if "angle" in kinds else 0  # coefficients of atan2
         if self.kind == "observer" and kinds & {"angle", "circular"}:
             n_numbers += 12  # coefficients of sine and cosine
@@ -122,7 +126,10 @@ class StateHistory:
         return [self.kind, *(np.ravel(values).tolist() for values in self.fitted.values())]
 
     def defines(self, *, acts_between: bool) -> Data:
-        """Return the macros; ``acts_between``: greedy actions may lie between those of a Box."""
+        """Return the macros; ``acts_between``: greedy actions may lie between those of a Box.
+
+        SDNN_HISTORY and SDNN_HOLDS are undefined where an agent has none: C asks whether they are.
+        """
         sizes: Data = {}
         if self.holds:
             sizes |= {"HOLDS": 1, "N_PARTS": len(self._part_sizes())}

@@ -102,6 +102,7 @@ class Learner(Writer[Network]):
         counts, means, squares = (image[f"running.{name}"].copy() for name in MOMENTS)
         state = self.agent._state_of("observations")
         if "low" in state:  # where a warm-up found the inputs, the ranges are listed too
+            # The ranges of cpp/include/sdnn/agents/running_ranges.hpp: 2.5 deviations each way.
             deviations = np.sqrt(squares / np.maximum(counts - 1.0, 1.0))
             deviations[counts < 2] = 1.0
             ends = 2.5 * np.maximum(deviations, np.maximum(1e-6 * np.abs(means), 1e-140))

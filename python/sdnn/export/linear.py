@@ -11,7 +11,7 @@ from sdnn import _core
 from sdnn.environments.types import Data
 from sdnn.export.code import Code
 from sdnn.export.text import Tables, real_number, rounded_up
-from sdnn.export.writer import Writer, require_few_weights
+from sdnn.export.writer import CHeader, Writer, require_few_weights
 
 _ONE = 1 << 16  # of rates
 _LEAST_LOGARITHM = -1e6  # of a discount of 0, which is 0 over any duration
@@ -21,14 +21,17 @@ class LinearWriter(Writer[_core.LinearSDNN]):
     """Makes the header of an agent whose readout is linear."""
 
     n_critic_rows: ClassVar[int] = 0
-    """Readout units before those of actions."""
+    """Readout units, rows of weights, before those of actions: 1 if the header has a critic."""
 
     def code(self) -> Code:
         """Return the code of its states."""
         return Code(self.network, self.n_inputs)
 
     def columns(self) -> NDArray[np.intp]:
-        """Return which columns of the agent's weights the header has, in its order."""
+        """Return the indices of the header's columns among those of the agent's weights.
+
+        The agent's weights have columns of 0 after each group, up to a multiple of 64.
+        """
         m = self.agent.approximator.n_pattern_units
         n_groups = len(self.network.pairs)
         slots = np.arange(n_groups)[:, None] * rounded_up(m, 64) + np.arange(m)
@@ -76,6 +79,24 @@ class LinearWriter(Writer[_core.LinearSDNN]):
         tables.add("uint32_t", "first_rows", first_rows, "First readout unit of each dimension.")
         return tables
 
+    def write_policy(
+        self, file: str, weights: NDArray[np.int32], defines: Data, action_bytes: int
+    ) -> CHeader:
+        """Return the header of a greedy policy, with weights of shape (n_rows, n_columns).
+
+        ``action_bytes`` are those that C needs on the stack for each action of a dimension.
+        """
+        tables, code = self.tables(), self.code()
+        tables.add("int32_t", "weights", weights.reshape(-1))
+        ram_bytes = code.most_columns * code.column_bytes + action_bytes * max(self.n_rows())
+        ram_bytes += 12 * self.n_inputs + self.history_bytes()  # bins, bins of a code, and patterns
+        sizes = {
+            "weight_bytes": 4 * self.n_weights(),
+            "ram_bytes": ram_bytes,
+            "n_words": code.most_columns * sum(self.n_rows()),
+        }
+        return self.write(file, self.description(), self.needs(**sizes), defines, tables, **sizes)
+
     def rule_of_values(self) -> Data:
         """Return the settings by which an agent with traces learns values, as whole numbers.
 
@@ -102,12 +123,13 @@ class LinearWriter(Writer[_core.LinearSDNN]):
         return {f"{macro}_FIRST": round(first * _ONE), f"{macro}_LAST": round(last * _ONE)}
 
     def with_states(self, n_bytes: int, plain_bytes: int, *, next_bins: bool) -> int:
-        """Add the bytes of the last states, with their history, to those of the fields before them.
+        """Return ``n_bytes`` of fields before the struct of the last states, and the bytes of it.
 
-        Without a history they have ``plain_bytes``; with one, or running ranges, they begin at a
-        multiple of 8 bytes.
+        Without a history it has ``plain_bytes`` and held readings; with one, or running ranges, it
+        begins at a multiple of 8 bytes. ``next_bins``: it has the bins of the next state.
         """
         if self.history.follows_ranges:
+            # Two states; of each number five of sdnn_ranges and a reading; two flags.
             states = 16 * self.n_inputs + (5 * 8 + 4) * self.n_observed + 2
             return rounded_up(n_bytes, 8) + rounded_up(states, 8)
         if not self.history.is_needed:

@@ -24,28 +24,22 @@ class QLambdaWriter(LinearWriter):
     agent: SDNNQLambda
 
     def tolerance(self) -> tuple[int, int]:
-        """Return the tolerance of ties as (number, exponent): the number is below 2^62."""
+        """Return (number, exponent) of the tolerance of ties, number 2^exponent; number < 2^62."""
         fraction, exponent = math.frexp(self.agent.learning.tie_tolerance)
         return int(fraction * _MOST_TOLERANCE), exponent - 62  # the fraction is in [0.5, 1)
 
     def header(self) -> CHeader:
-        """Make the header."""
-        tables, code, n_weights = self.tables(), self.code(), self.n_weights()
+        """Make the header; an action has a value of 8 bytes."""
         state = self.agent._state_of("agent")
-        weights = state["action_value.weights"]
-        if np.any(state.get("action_value.n_snapshots", 0)):
-            weights = state["action_value.averaged_weights"]
-        tables.add("int32_t", "weights", weights[:, self.columns()].reshape(-1))
+        weights, averaged = _WEIGHTS
+        has_average = np.any(state.get("action_value.n_snapshots", 0))
         number, exponent = self.tolerance()
-        shift = int(state.get("action_value.exponent", 0)) - exponent
-        tolerance = min(number << max(-shift, 0) >> max(shift, 0), _MOST_TOLERANCE)
-        n_words = min(code.most_columns, code.n_columns) * sum(self.n_rows())
-        ram_bytes = code.most_columns * code.column_bytes + 8 * max(self.n_rows())
-        ram_bytes += 12 * self.n_inputs + self.history_bytes()
-        sizes = {"weight_bytes": 4 * n_weights, "ram_bytes": ram_bytes, "n_words": n_words}
+        # Values, of a constant policy, count units of 2 to this power, and the tolerance too.
+        shift = exponent - int(state.get("action_value.exponent", 0))
+        tolerance = min(number << shift if shift > 0 else number >> -shift, _MOST_TOLERANCE)
         defines = {**self.defines(), "TIE_TOLERANCE": f"INT64_C({tolerance})"}
-        description, needs = self.description(), self.needs(**sizes)
-        return self.write("sdnn_greedy_q_lambda.h", description, needs, defines, tables, **sizes)
+        rows = state[averaged if has_average else weights][:, self.columns()]
+        return self.write_policy("sdnn_greedy_q_lambda.h", rows, defines, 8)
 
 
 class QLambdaLearner(Learner[_core.LinearSDNN], QLambdaWriter):

@@ -97,7 +97,10 @@ class SDNNCWriter(Writer[_core.SDNNC]):
         return self.write("sdnn_greedy_c.h", description, needs, defines, tables, **sizes)
 
     def _add_ranks(self, tables: Tables) -> None:
-        """Add the ranks of values, so that C compares whole numbers, and which ranks tie."""
+        """Add the ranks of the values of all counts, so that C compares whole numbers.
+
+        With a tolerance of ties, also add the lowest rank that ties with each rank.
+        """
         networks = self.networks
         values = networks[0].output_values()
         if any((network.output_values() != values).any() for network in networks):
@@ -283,7 +286,10 @@ class SDNNCLearner(Learner[_core.SDNNC], SDNNCWriter):
         )
 
     def _rates(self, state: Data) -> dict[str, str]:
-        """Return the C code by which scheduled rates, alpha and epsilon, follow the progress."""
+        """Return the macros by which alpha and epsilon follow the progress of the training.
+
+        A rate moves from FIRST to LAST in a FRACTION of it; if that is 0, it stays as it is now.
+        """
         learning, defines = self.agent.learning, dict[str, str]()
         fractions = {"learning_rate": 1.0, "epsilon": learning.exploration_fraction}
         for macro, name in (("RATE", "learning_rate"), ("EPSILON", "epsilon")):

@@ -117,24 +117,24 @@ class Writer(ABC, Generic[Network]):
         actions = [self.agent.actions_of(d) for d in range(self.agent.n_dimensions)]
         return np.stack(actions, axis=1).astype(self.agent.action_space.dtype)
 
-    def _checked_fraction_bits(self, given: int | None) -> int:
-        """Return checked fraction bits, or by default as many as fit numbers of 32 bits."""
+    def _checked_fraction_bits(self, fraction_bits: int | None) -> int:
+        """Return the fraction bits; by default 16, or fewer where 32 bits hold no more."""
         ranges = [source for source in self.inputs if source.kind in ("variable", "circular")]
         numbers = [abs(end) for source in ranges for end in (source.low, source.high)]
         if self.box is not None:
             numbers += np.abs(self.box.astype(np.float64)).reshape(-1).tolist()
         largest = max(numbers, default=0.0)
-        most_bits = next(
-            (b for b in range(MOST_FRACTION_BITS, -1, -1) if math.ceil(largest * 2**b) < 2**31), -1
-        )
+        most_bits = MOST_FRACTION_BITS
+        while most_bits >= 0 and math.ceil(largest * 2**most_bits) >= 2**31:
+            most_bits -= 1
         if most_bits < 0:
             raise ValueError(
                 "observation ranges and actions must be below 2^31 in a C header,"
                 f" got {largest:g}: scale them"
             )
-        if given is None:
+        if fraction_bits is None:
             return min(most_bits, _DEFAULT_FRACTION_BITS)
-        bits = whole("fraction_bits", given, 0, MOST_FRACTION_BITS)
+        bits = whole("fraction_bits", fraction_bits, 0, MOST_FRACTION_BITS)
         if bits > most_bits:
             problem = f"must be at most {most_bits}, so that {largest:g} fits 32 bits, got {bits}"
             raise argument_error("fraction_bits", problem)
@@ -276,7 +276,7 @@ class Writer(ABC, Generic[Network]):
         )
 
     def _missing_remark(self) -> list[str]:
-        """Tell the header's reader what happens to an observation with a missing reading."""
+        """Describe what happens to an observation with a missing reading."""
         name = self.name.upper()
         if self.codes_missing:
             return [f"A reading may be {name}_MISSING: each input has a pattern for that."]
