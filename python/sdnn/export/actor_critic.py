@@ -11,8 +11,8 @@ from sdnn import _core
 from sdnn.agents import SDNNActorCritic
 from sdnn.environments.types import Array, Data
 from sdnn.export.code import Code
-from sdnn.export.learner import MOMENTS, NONE, SCALE_FIELDS, Field, Learner
-from sdnn.export.linear import LinearWriter
+from sdnn.export.learner import MOMENTS, NONE, SCALE_FIELDS, Field
+from sdnn.export.linear import LinearLearner, LinearWriter
 from sdnn.export.text import Tables, rounded_up
 from sdnn.export.writer import CHeader, follows_ranges
 
@@ -148,7 +148,7 @@ class ActorCriticWriter(LinearWriter):
         return self.write_policy("sdnn_greedy_actor_critic.h", weights, self.defines(), 12)
 
 
-class ActorCriticLearner(Learner[_core.LinearSDNN], ActorCriticWriter):
+class ActorCriticLearner(LinearLearner, ActorCriticWriter):
     """Makes the header of an `SDNNActorCritic` agent that learns."""
 
     magic = 0x414E4453  # "SDNA"
@@ -216,44 +216,27 @@ class ActorCriticLearner(Learner[_core.LinearSDNN], ActorCriticWriter):
 
     def header(self) -> CHeader:
         """Make the header."""
-        state, tables = self.state(), self.tables()
-        n_weights = self.n_weights()
+        tables, weights = self.tables(), self.weights(self.state())
         self.add_head(tables, "weights")
-        weights = self.weights(state)
-        first_weights = weights.reshape(-1) if weights.any() else np.zeros(0, np.int32)
-        tables.add("int32_t", "first_weights", first_weights)
         if not self.history.has_episodes and not self.codes_missing and not self._moments():
-            self.add_limits(tables)
-        defines = {
-            **self.defines(),
-            **self._learning_rule(),
-            "FINGERPRINT": f"UINT32_C(0x{self.fingerprint():08x})",
-            "N_FIRST_WEIGHTS": first_weights.size,
-        }
-        ram_bytes = self._ram_bytes(n_weights)
-        return self.write(
-            "sdnn_actor_critic.h",
-            self.description(),
-            self.learning_needs(10, ram_bytes, n_weights),
-            defines,
-            tables,
-            weight_bytes=0,
-            ram_bytes=ram_bytes,
-            n_words=self.code().most_columns * sum(self.n_rows()),
-        )
+            self.add_limits(tables)  # C compares observations and not states
+        first_weights = weights.reshape(-1) if weights.any() else np.zeros(0, np.int32)
+        fingerprint = {"FINGERPRINT": f"UINT32_C(0x{self.fingerprint():08x})"}
+        defines = {**self._learning_rule(), **fingerprint}
+        sizes = {"kilobytes": 10, "ram_bytes": self._ram_bytes(self.n_weights())}
+        return self.write_learner("sdnn_actor_critic.h", first_weights, tables, defines, **sizes)
 
     def _learning_rule(self) -> Data:
         """Return the macros of the learning rule; entropy counts units of 2^-16."""
-        learning, state = self.agent.learning, self.agent._state_of("agent")
+        learning = self.agent.learning
         first, last = learning.learning_rate, learning.final_learning_rate
-        if "learning_rate" in state:
+        actor_rates = learning.actor_learning_rate, learning.final_actor_learning_rate
+        if "learning_rate" in self.agent._state_of("agent"):  # it was set, and has no schedule
             first, last = self.agent.learning_rate, None
         return {
             **self.rule_of_values(),
             **self.rates("RATE", first, last),
-            **self.rates(
-                "ACTOR_RATE", learning.actor_learning_rate, learning.final_actor_learning_rate
-            ),
+            **self.rates("ACTOR_RATE", *actor_rates),
             "ENTROPY": math.floor(learning.entropy * 65536 + 0.5),
         }
 

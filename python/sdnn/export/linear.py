@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from sdnn import _core
 from sdnn.environments.types import Data
 from sdnn.export.code import Code
+from sdnn.export.learner import Learner
 from sdnn.export.text import Tables, real_number, rounded_up
 from sdnn.export.writer import CHeader, Writer, require_few_weights
 
@@ -96,6 +97,36 @@ class LinearWriter(Writer[_core.LinearSDNN]):
             "n_words": code.most_columns * sum(self.n_rows()),
         }
         return self.write(file, self.description(), self.needs(**sizes), defines, tables, **sizes)
+
+
+class LinearLearner(Learner[_core.LinearSDNN], LinearWriter):
+    """Makes the header of an agent that learns a linear readout with traces."""
+
+    def write_learner(
+        self,
+        file: str,
+        first_weights: NDArray[np.int32],
+        tables: Tables,
+        defines: Data,
+        *,
+        kilobytes: int,
+        ram_bytes: int,
+    ) -> CHeader:
+        """Return the header of an agent that begins with a row of weights, and with 0 after them.
+
+        ``kilobytes`` are those of its code, as for `learning_needs`.
+        """
+        tables.add("int32_t", "first_weights", first_weights)
+        return self.write(
+            file,
+            self.description(),
+            self.learning_needs(kilobytes, ram_bytes, self.n_weights()),
+            {**self.defines(), **defines, "N_FIRST_WEIGHTS": first_weights.size},
+            tables,
+            weight_bytes=0,
+            ram_bytes=ram_bytes,
+            n_words=self.code().most_columns * sum(self.n_rows()),
+        )
 
     def rule_of_values(self) -> Data:
         """Return the settings by which an agent with traces learns values, as whole numbers.

@@ -6,11 +6,10 @@ import math
 
 import numpy as np
 
-from sdnn import _core
 from sdnn.agents import SDNNQLambda
 from sdnn.environments.types import Array, Data
-from sdnn.export.learner import NONE, SCALE_FIELDS, Field, Learner
-from sdnn.export.linear import LinearWriter
+from sdnn.export.learner import NONE, SCALE_FIELDS, Field
+from sdnn.export.linear import LinearLearner, LinearWriter
 from sdnn.export.text import rounded_up
 from sdnn.export.writer import CHeader
 
@@ -42,7 +41,7 @@ class QLambdaWriter(LinearWriter):
         return self.write_policy("sdnn_greedy_q_lambda.h", rows, defines, 8)
 
 
-class QLambdaLearner(Learner[_core.LinearSDNN], QLambdaWriter):
+class QLambdaLearner(LinearLearner, QLambdaWriter):
     """Makes the header of an `SDNNQLambda` agent that learns."""
 
     magic = 0x4C4E4453  # "SDNL"
@@ -95,30 +94,14 @@ class QLambdaLearner(Learner[_core.LinearSDNN], QLambdaWriter):
     def header(self) -> CHeader:
         """Make the header."""
         state, tables = self.state(), self.tables()
-        n_weights = self.n_weights()
         self.add_head(tables, _WEIGHTS[0])
         rows = [state[name][:, self.columns()].reshape(-1) for name in _WEIGHTS if name in state]
         while rows and not rows[-1].any():
-            rows.pop()
+            rows.pop()  # weights, or their averages, that are all 0 need no table
         first_weights = np.concatenate([*rows, np.zeros(0, np.int32)])
-        tables.add("int32_t", "first_weights", first_weights)
-        defines = {
-            **self.defines(),
-            **self._learning_rule(),
-            **self.learning_defines(),
-            "N_FIRST_WEIGHTS": first_weights.size,
-        }
-        ram_bytes = self._ram_bytes(n_weights)
-        return self.write(
-            "sdnn_q_lambda.h",
-            self.description(),
-            self.learning_needs(9, ram_bytes, n_weights),
-            defines,
-            tables,
-            weight_bytes=0,
-            ram_bytes=ram_bytes,
-            n_words=self.code().most_columns * sum(self.n_rows()),
-        )
+        defines = {**self._learning_rule(), **self.learning_defines()}
+        sizes = {"kilobytes": 9, "ram_bytes": self._ram_bytes(self.n_weights())}
+        return self.write_learner("sdnn_q_lambda.h", first_weights, tables, defines, **sizes)
 
     def _learning_rule(self) -> Data:
         """Return the macros of the learning rule."""
