@@ -327,6 +327,9 @@ static inline void sdnn_learn_in_each(sdnn_agent* agent, const int32_t* observat
   if (size != INT32_MIN) sdnn_refine_unit(agent, size);
 }
 
+/* The head of an image has magic number and fingerprint, and from these bytes on: 8 exponent, scale
+ * of errors with 12 exponent, 16 n_errors and 20 mean_square, 28 n_learned, 36 scale of rewards, 56
+ * random generators, 120 moments of running ranges. */
 #define SDNN_IMAGE_HEAD 120
 #ifdef SDNN_RUNNING_RANGES_H
 #undef SDNN_IMAGE_HEAD
@@ -363,6 +366,7 @@ static inline void sdnn_begin_as(sdnn_agent* agent, const uint8_t* head) {
   sdnn_apply_rates(agent);
 }
 
+/* Whether an image may have this exponent of a unit. */
 static inline int sdnn_is_exponent(int32_t exponent) {
   return exponent >= -1100 && exponent <= 1100;
 }

@@ -2,7 +2,11 @@
 #ifndef SDNN_C_IMAGE_H
 #define SDNN_C_IMAGE_H
 
-/* Where the parts of an image begin: the head, rewards, returns, thresholds and weights. */
+/* Where the parts of an image begin: the head, rewards, returns, thresholds and weights. The head
+ * has magic number and fingerprint, and from these bytes on: 8 fraction bits, 12 n_random_left, 16
+ * random generators, 176 scale of rewards, 196 progress, 204 q_low, 212 q_high; with an adaptive
+ * range also 220 low, 228 high, 236 sum, 244 n_returns, 252 due, 260 n_rewards, 264 n_kept_returns,
+ * 268 oldest. */
 #if SDNN_ADAPTS
 #define SDNN_IMAGE_HEAD 272
 #define SDNN_RETURNS_AT (SDNN_IMAGE_HEAD + UINT32_C(8) * SDNN_HORIZON)
@@ -23,10 +27,8 @@ static inline void sdnn_carry_head(sdnn_agent* agent, uint8_t* head, int reads) 
   at = sdnn_carry_scale(at, &agent->scale, reads);
   at = sdnn_carry_64(at, &agent->progress, 1, reads);
   at = sdnn_carry_64(at, &agent->q_low, 1, reads);
-#if !SDNN_ADAPTS
-  sdnn_carry_64(at, &agent->q_high, 1, reads);
-#else
   at = sdnn_carry_64(at, &agent->q_high, 1, reads);
+#if SDNN_ADAPTS
   at = sdnn_carry_64(at, &agent->low, 1, reads);
   at = sdnn_carry_64(at, &agent->high, 1, reads);
   at = sdnn_carry_64(at, &agent->sum, 1, reads);
@@ -34,8 +36,9 @@ static inline void sdnn_carry_head(sdnn_agent* agent, uint8_t* head, int reads) 
   at = sdnn_carry_64(at, &agent->due, 1, reads);
   at = sdnn_carry_32(at, &agent->n_rewards, 1, reads);
   at = sdnn_carry_32(at, &agent->n_kept_returns, 1, reads);
-  sdnn_carry_32(at, &agent->oldest, 1, reads);
+  at = sdnn_carry_32(at, &agent->oldest, 1, reads);
 #endif
+  (void)at;
 }
 
 /* Makes an agent with the head of an image, and nothing learned. */
@@ -94,7 +97,7 @@ static inline void sdnn_carry_arrays(sdnn_agent* agent, const sdnn_part* part, i
   sdnn_carry_words(part, agent->weights, SDNN_WEIGHTS_AT, SDNN_N_WORDS, reads);
 }
 
-/* Whether a number read is one, and at most 2^100 in size. */
+/* Whether bits that were read are a number, and at most 2^100 in size. */
 static inline int sdnn_is_real(sdnn_real x) { return x << 1 >> 1 <= UINT64_C(1123) << 52; }
 
 #if SDNN_ADAPTS

@@ -20,6 +20,7 @@ typedef struct {
 
 static const sdnn_network sdnn_networks[SDNN_N_DIMENSIONS] = {SDNN_NETWORKS};
 
+/* 1 if a hidden unit fires, by the bits that sdnn_fire sets, else 0. */
 static inline uint32_t sdnn_fires(const uint32_t* fires, uint32_t unit) {
   return (fires[unit >> 5] >> (unit & 31)) & 1;
 }
@@ -68,6 +69,7 @@ static inline uint32_t sdnn_best_action(const sdnn_network* network, const uint3
   return sdnn_tied(ranks, network->n_actions, (sdnn_score)best);
 }
 
+/* Writes the best action in each dimension. */
 static inline void sdnn_greedy_in_each(const uint32_t* bins, uint32_t* action) {
   uint32_t d;
   for (d = 0; d < SDNN_N_DIMENSIONS; ++d) action[d] = sdnn_best_action(&sdnn_networks[d], bins);

@@ -24,6 +24,7 @@ static inline void sdnn_note_act(sdnn_states* states, const uint32_t* action) {
   (void)action;
 }
 
+/* The bins of an observation in which the agent acts greedily, in an episode of greedy steps. */
 static inline void sdnn_read_greedily(const sdnn_states* states, sdnn_greedy_episode* episode,
                                       const int32_t* observation, uint32_t* bins) {
   sdnn_bins_of_fixed(sdnn_readings_of(&states->readings, episode, observation), bins);
@@ -36,6 +37,7 @@ static inline void sdnn_note_greedy(const sdnn_greedy_episode* episode, const ui
   (void)place;
 }
 
+/* Begins a greedy episode, apart from the one of which the agent learns. */
 static inline void sdnn_begin_greedy(const sdnn_states* states, sdnn_greedy_episode* episode) {
   sdnn_forget_held(episode->held);
   episode->n_reads = states->readings.n_reads;

@@ -45,6 +45,8 @@ static inline void sdnn_inputs_of_fixed(const int32_t* observation, sdnn_real* i
 
 #if SDNN_IS_OBSERVER
 
+/* The coordinate of the number k, an input x, in which the observer estimates: an angle in radians,
+ * or a distance from the mean in standard deviations. */
 static inline sdnn_real sdnn_coordinate(sdnn_real x, uint32_t k) {
   if (sdnn_is_circular[k]) return sdnn_times(SDNN_TWO_PI, x);
   return sdnn_over(sdnn_minus(x, sdnn_means[k]), sdnn_deviations[k]);
@@ -65,7 +67,9 @@ static inline const sdnn_real* sdnn_add_feature(sdnn_real* changes, const sdnn_r
   return weights;
 }
 
-/* Moves the estimates to what is expected after the last action. */
+/* Moves the estimates to those expected after the last action, by a model that is linear in 1, each
+ * estimate or its cosine and sine, and the actions. Changes are limited to 3, and estimates that
+ * are no angles to 6 standard deviations. */
 static inline void sdnn_predict(sdnn_episode* episode) {
   const sdnn_real largest_change = UINT64_C(0x4008000000000000); /* 3 */
   const sdnn_real farthest = UINT64_C(0x4018000000000000);       /* 6 */

@@ -82,6 +82,7 @@ static inline void sdnn_save_part(const sdnn_agent* agent, uint32_t offset, uint
   }
 }
 
+/* Writes the whole image, of SDNN_IMAGE_BYTES bytes, as sdnn_save_part does. */
 static inline void sdnn_save(const sdnn_agent* agent, uint8_t* image) {
   sdnn_save_part(agent, 0, image, SDNN_IMAGE_BYTES);
 }

@@ -78,86 +78,55 @@ static inline void sdnn_choose(const sdnn_agent* agent, const sdnn_keeper* keepe
   sdnn_note_greedy(SDNN_EPISODE action, place);
 }
 
-/* A greedy action in each dimension. */
-static inline void sdnn_greedy_in_each(const sdnn_agent* agent,
-                                       SDNN_EPISODE_PARAMETER const int32_t* observation,
-                                       uint32_t* action) {
-  sdnn_choose(agent, 0, SDNN_EPISODE observation, action, 0);
-}
+/* Defines a function that chooses a number for each dimension: `call` writes them to `numbers`.
+ * With one dimension the function returns the number, with more its last parameter is the array. */
+#if SDNN_N_DIMENSIONS == 1
+#define SDNN_CHOICE(name, call, ...)         \
+  static inline uint32_t name(__VA_ARGS__) { \
+    uint32_t numbers[1];                     \
+    call;                                    \
+    return numbers[0];                       \
+  }
+#else
+#define SDNN_CHOICE(name, call, ...) \
+  static inline void name(__VA_ARGS__, uint32_t* numbers) { call; }
+#endif
 
-/* The greedy action of the kept policy, or of the present one where none is kept. */
-static inline void sdnn_best_in_each(const sdnn_agent* agent, const sdnn_keeper* keeper,
-                                     SDNN_EPISODE_PARAMETER const int32_t* observation,
-                                     uint32_t* action) {
-  sdnn_choose(agent, keeper, SDNN_EPISODE observation, action, 0);
-}
+/* The action to take, at times not a greedy one. */
+SDNN_CHOICE(sdnn_act, sdnn_act_in_each(agent, observation, numbers), sdnn_agent* agent,
+            const int32_t* observation)
+/* A greedy action. */
+SDNN_CHOICE(sdnn_greedy, sdnn_choose(agent, 0, SDNN_EPISODE observation, numbers, 0),
+            const sdnn_agent* agent, SDNN_EPISODE_PARAMETER const int32_t* observation)
+/* A greedy action of the kept policy, or of the present one where none is kept. */
+SDNN_CHOICE(sdnn_best, sdnn_choose(agent, keeper, SDNN_EPISODE observation, numbers, 0),
+            const sdnn_agent* agent, const sdnn_keeper* keeper,
+            SDNN_EPISODE_PARAMETER const int32_t* observation)
 
 #if SDNN_IS_BOX
-/* The fractional index of the greedy action in each dimension, times 2^16; sdnn_action_at converts
- * it to the action. */
-static inline void sdnn_place_in_each(const sdnn_agent* agent,
+/* Writes the fractional index of the greedy action in each dimension, times 2^16; sdnn_action_at
+ * converts it to the action. */
+static inline void sdnn_place_in_each(const sdnn_agent* agent, const sdnn_keeper* keeper,
                                       SDNN_EPISODE_PARAMETER const int32_t* observation,
                                       uint32_t* place) {
   uint32_t action[SDNN_N_DIMENSIONS];
-  sdnn_choose(agent, 0, SDNN_EPISODE observation, action, place);
-}
-/* Like sdnn_best_in_each, but writes fractional indices, times 2^16. */
-static inline void sdnn_best_place_in_each(const sdnn_agent* agent, const sdnn_keeper* keeper,
-                                           SDNN_EPISODE_PARAMETER const int32_t* observation,
-                                           uint32_t* place) {
-  uint32_t action[SDNN_N_DIMENSIONS];
   sdnn_choose(agent, keeper, SDNN_EPISODE observation, action, place);
 }
+/* Like sdnn_greedy and sdnn_best, but fractional indices, times 2^16. */
+SDNN_CHOICE(sdnn_place, sdnn_place_in_each(agent, 0, SDNN_EPISODE observation, numbers),
+            const sdnn_agent* agent, SDNN_EPISODE_PARAMETER const int32_t* observation)
+SDNN_CHOICE(sdnn_best_place, sdnn_place_in_each(agent, keeper, SDNN_EPISODE observation, numbers),
+            const sdnn_agent* agent, const sdnn_keeper* keeper,
+            SDNN_EPISODE_PARAMETER const int32_t* observation)
 #endif
 
 #if SDNN_N_DIMENSIONS == 1
-/* Like sdnn_act_in_each, for actions of one dimension. */
-static inline uint32_t sdnn_act(sdnn_agent* agent, const int32_t* observation) {
-  uint32_t action;
-  sdnn_act_in_each(agent, observation, &action);
-  return action;
-}
-/* Like sdnn_greedy_in_each, for actions of one dimension. */
-static inline uint32_t sdnn_greedy(const sdnn_agent* agent,
-                                   SDNN_EPISODE_PARAMETER const int32_t* observation) {
-  uint32_t action;
-  sdnn_greedy_in_each(agent, SDNN_EPISODE observation, &action);
-  return action;
-}
-/* Like sdnn_best_in_each, for actions of one dimension. */
-static inline uint32_t sdnn_best(const sdnn_agent* agent, const sdnn_keeper* keeper,
-                                 SDNN_EPISODE_PARAMETER const int32_t* observation) {
-  uint32_t action;
-  sdnn_best_in_each(agent, keeper, SDNN_EPISODE observation, &action);
-  return action;
-}
 static inline void sdnn_learn(sdnn_agent* agent, const int32_t* observation, uint32_t action,
                               int32_t reward, const int32_t* next_observation, int terminated) {
   sdnn_learn_in_each(agent, observation, &action, reward, next_observation, terminated);
 }
-#if SDNN_IS_BOX
-/* Like sdnn_place_in_each, for actions of one dimension. */
-static inline uint32_t sdnn_place(const sdnn_agent* agent,
-                                  SDNN_EPISODE_PARAMETER const int32_t* observation) {
-  uint32_t place;
-  sdnn_place_in_each(agent, SDNN_EPISODE observation, &place);
-  return place;
-}
-/* Like sdnn_best_place_in_each, for actions of one dimension. */
-static inline uint32_t sdnn_best_place(const sdnn_agent* agent, const sdnn_keeper* keeper,
-                                       SDNN_EPISODE_PARAMETER const int32_t* observation) {
-  uint32_t place;
-  sdnn_best_place_in_each(agent, keeper, SDNN_EPISODE observation, &place);
-  return place;
-}
-#endif
 #else
-#define sdnn_act sdnn_act_in_each
-#define sdnn_greedy sdnn_greedy_in_each
-#define sdnn_best sdnn_best_in_each
 #define sdnn_learn sdnn_learn_in_each
-#define sdnn_place sdnn_place_in_each
-#define sdnn_best_place sdnn_best_place_in_each
 #endif
 
 #include "sdnn_learn_over.h"

@@ -30,6 +30,7 @@ static inline uint32_t sdnn_greedy_bins(const uint32_t* bins) {
     return action;                                                  \
   }
 #else
+/* Writes the greedy action in a state, a number for each dimension. */
 static inline void sdnn_greedy_bins(const uint32_t* bins, uint32_t* action) {
   sdnn_greedy_in_each(bins, action);
 }

@@ -405,6 +405,9 @@ static inline int64_t sdnn_q(const sdnn_agent* agent, const int32_t* observation
 #define sdnn_q sdnn_q_of_each
 #endif
 
+/* The head of an image has magic number and fingerprint, and from these bytes on: 8 exponent,
+ * 12 n_snapshots, 16 n_random_left, 20 n_ended, 24 n_learned, 32 n_steps, 40 scale of rewards,
+ * 60 random generators. */
 #define SDNN_IMAGE_HEAD 188
 #define SDNN_IMAGE_BYTES (SDNN_IMAGE_HEAD + 4 * SDNN_N_ALL_WEIGHTS + 4)
 
