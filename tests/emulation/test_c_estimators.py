@@ -105,17 +105,9 @@ def test_the_header_states_the_stack_that_an_estimator_needs(name, learning, nee
     calls = LEARNS.replace(" && model_PREDICT(&model, x, y)", "") if learning else PREDICTS
     calls = calls.replace("PREDICT", "scores" if is_classifier else "predict")
     (tmp_path / "calls.c").write_text(calls.replace("TARGET", "1" if is_classifier else "y"))
-    options = (
-        *STRICT,
-        *ALONE,
-        "-Wno-unused-parameter",
-        "-mthumb",
-        "-mcpu=cortex-m0plus",
-        "-mfloat-abi=soft",
-        "-Os",
-        "-c",
-    )
-    run(arm.compiler, *options, "-fstack-usage", "calls.c", "-o", "calls.o", cwd=tmp_path)
+    options = (*STRICT, *ALONE, "-Wno-unused-parameter", "-Os", "-c", "-fstack-usage")
+    cortex_m0 = ("-mthumb", "-mcpu=cortex-m0plus", "-mfloat-abi=soft")
+    run(arm.compiler, *options, *cortex_m0, "calls.c", "-o", "calls.o", cwd=tmp_path)
     frames = (tmp_path / "calls.su").read_text().splitlines()
     stack = sum(int(line.split("\t")[1]) for line in frames)
     (stated,) = re.findall(r" ([\d,]+) bytes of arrays", text)

@@ -33,9 +33,9 @@ ARM = TARGETS["arm"]
 
 @pytest.fixture(params=[name for name in TARGETS if name != "x86-64"])
 def target(request, needs):
-    found = TARGETS[request.param]
-    needs(*filter(None, (found.compiler, found.runner)))
-    return found
+    target = TARGETS[request.param]
+    needs(*filter(None, (target.compiler, target.runner)))
+    return target
 
 
 @pytest.mark.parametrize("name", AGENTS)
@@ -115,12 +115,8 @@ def test_learning_compiles_for_microcontrollers_with_few_library_calls(name, kin
     options = (*STRICT, *ALONE, f"--target={kind}", "-Os", "-c")
     run("clang", *options, tmp_path / "calls.c", "-o", done)
     called = {line.split()[-1].decode() for line in run("nm", "-u", done).splitlines()}
-    wide = (
-        {"__aeabi_lmul", "__aeabi_llsl", "__aeabi_llsr", "__aeabi_lasr"}
-        if kind.startswith("thumbv6m")
-        else set()
-    )
-    assert called <= wide | {"flash"}
+    wide = {"__aeabi_lmul", "__aeabi_llsl", "__aeabi_llsr", "__aeabi_lasr"}
+    assert called <= {"flash"} | (wide if kind.startswith("thumbv6m") else set())
 
 
 @pytest.mark.parametrize("name", LEARNERS)

@@ -97,7 +97,8 @@ def test_greedy_actions_between_those_of_a_box_are_those_of_the_agent(name, targ
     written = np.frombuffer(run(executable, input=fixed.tobytes()), "<i4").reshape(-1, n, 2)
     expected = np.array([agent.act(x / scale, explore=False) for x in fixed], float)
     places = [
-        [place_of(agent.actions_of(d), one) for d, one in enumerate(action)] for action in expected
+        [place_of(agent.actions_of(d), number) for d, number in enumerate(action)]
+        for action in expected
     ]
     assert written[..., 0].tolist() == places
     np.testing.assert_allclose(written[..., 1] / scale, expected, atol=1.0 / scale)

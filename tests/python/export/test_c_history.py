@@ -20,7 +20,7 @@ from c_histories import (
     warmed_up,
 )
 from c_learners import build, run_agent, run_program
-from c_policies import SANITIZED, STRICT, STRICT_CPP, box, program, run
+from c_policies import SANITIZED, STRICT, box, program, run
 from refusals import refuses
 from sdnn.agents import SDNNQLambda, SDNNQLearning
 from sdnn.export import c_header, load_image, save_image
@@ -115,17 +115,6 @@ def test_nan_and_infinity_have_defined_actions(needs, tmp_path):
         }
     """.replace("NAN", '__builtin_nan("")').replace("INFINITY", "__builtin_inf()")
     run(program(tmp_path, source, "clang", *STRICT, *caught))
-
-
-@pytest.mark.parametrize("compiler", ["gcc", "clang", "g++", "clang++"])
-@pytest.mark.parametrize("learning", [False, True])
-@pytest.mark.parametrize("name", ["differences", "actor-observer"])
-def test_headers_with_a_history_compile_in_c_and_cpp(name, learning, compiler, needs, tmp_path):
-    needs(compiler)
-    (tmp_path / "agent.h").write_text(c_header(LEARNERS[name](), "agent", learning=learning).text)
-    source = '#define AGENT_USE_FLOAT\n#include "agent.h"\nint main(void) { return 0; }'
-    options = STRICT_CPP if compiler.endswith("++") else STRICT
-    run(program(tmp_path, source, compiler, *options, "-O2"))
 
 
 def test_a_header_describes_the_episode_and_the_added_inputs():

@@ -13,10 +13,12 @@ from sdnn.agents import SDNNQLambda, SDNNQLearning
 from sdnn.export import c_header, estimator_header, new_agent
 
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror")
+IN_CPP = ("-x", "c++", *STRICT_CPP, "-Wpedantic", "-Wshadow")
 COMPILERS = {
     "gcc": ("-std=c99", *WARNINGS),
     "clang": ("-std=c99", *WARNINGS),
-    "g++": ("-x", "c++", *STRICT_CPP, "-Wpedantic", "-Wshadow"),
+    "g++": IN_CPP,
+    "clang++": IN_CPP,
 }
 
 
@@ -29,7 +31,7 @@ def headers():
         header_by_name[name] = c_header(getattr(c_learners, name)(), name, learning=True)
     for name in c_learners.TIMED:
         header_by_name[name.replace("-", "_")] = c_learners.exported(name, name.replace("-", "_"))
-    for name in ("observer", "actor-averages"):
+    for name in ("observer", "differences", "actor-averages", "actor-observer"):
         agent = c_learners.LEARNERS[name]()
         prefix = name.replace("-", "_")
         header_by_name[prefix] = c_header(agent, prefix, learning=True)
@@ -74,12 +76,12 @@ def test_compilers_warn_of_nothing_in_any_header(compiler, folder, needs):
 def test_cppcheck_finds_nothing_in_any_header(folder, needs):
     needs("cppcheck")
     # Definitions on the command line keep it from trying every combination of them.
-    found = run(
+    findings = run(
         "cppcheck", "--enable=warning,style,performance,portability", "--quiet", "--std=c99",
         "-DONE", "--inline-suppr", "--error-exitcode=1", "-j", os.cpu_count(),
         *sorted(folder.glob("*.c")),
     )  # fmt: skip
-    assert found == b""
+    assert findings == b""
 
 
 @pytest.mark.parametrize("kind", ["q-lambda", "actor-critic", "sdnn-c"])

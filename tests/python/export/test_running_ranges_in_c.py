@@ -38,8 +38,8 @@ def test_square_roots_have_the_bits_of_ieee_754(target, tmp_path):
     near = np.concatenate([whole**2, np.nextafter(whole**2, 0), np.nextafter(whole**2, np.inf)])
     tiny = random.integers(0, 2**52, 1000, np.uint64).view(np.float64)
     numbers = np.concatenate([numbers, near, tiny, [0.0, 2.0, 1e-140]])
-    came = np.frombuffer(run(roots, input=numbers.tobytes()), "<u8")
-    assert np.array_equal(came, np.sqrt(numbers).view(np.uint64))
+    roots_in_c = np.frombuffer(run(roots, input=numbers.tobytes()), "<u8")
+    assert np.array_equal(roots_in_c, np.sqrt(numbers).view(np.uint64))
 
 
 def test_an_image_brings_its_ranges_to_a_header_of_other_ranges(target, tmp_path):
