@@ -13,16 +13,15 @@
 #ifdef __cplusplus
 class sdnn_learner {
  public:
+  typedef const int32_t (&observation_type)[SDNN_N_OBSERVED];
   sdnn_learner() { sdnn_begin(&agent_); }
   void begin_episode() { sdnn_begin_episode(&agent_); }
 #if SDNN_N_DIMENSIONS == 1
   typedef uint32_t action_type;
-  uint32_t act(const int32_t (&observation)[SDNN_N_OBSERVED]) {
-    return sdnn_act(&agent_, observation);
-  }
+  uint32_t act(observation_type observation) { return sdnn_act(&agent_, observation); }
 #else
   typedef const uint32_t (&action_type)[SDNN_N_DIMENSIONS];
-  void act(const int32_t (&observation)[SDNN_N_OBSERVED], uint32_t (&action)[SDNN_N_DIMENSIONS]) {
+  void act(observation_type observation, uint32_t (&action)[SDNN_N_DIMENSIONS]) {
     sdnn_act(&agent_, observation, action);
   }
 #endif
@@ -32,20 +31,19 @@ class sdnn_learner {
   }
 #endif
 #if SDNN_N_DIMENSIONS == 1
-  uint32_t greedy(SDNN_EPISODE_PARAMETER const int32_t (&observation)[SDNN_N_OBSERVED]) const {
+  uint32_t greedy(SDNN_EPISODE_PARAMETER observation_type observation) const {
     return sdnn_greedy(&agent_, SDNN_EPISODE observation);
   }
   uint32_t best(const sdnn_keeper& keeper,
-                SDNN_EPISODE_PARAMETER const int32_t (&observation)[SDNN_N_OBSERVED]) const {
+                SDNN_EPISODE_PARAMETER observation_type observation) const {
     return sdnn_best(&agent_, &keeper, SDNN_EPISODE observation);
   }
 #else
-  void greedy(SDNN_EPISODE_PARAMETER const int32_t (&observation)[SDNN_N_OBSERVED],
+  void greedy(SDNN_EPISODE_PARAMETER observation_type observation,
               uint32_t (&action)[SDNN_N_DIMENSIONS]) const {
     sdnn_greedy(&agent_, SDNN_EPISODE observation, action);
   }
-  void best(const sdnn_keeper& keeper,
-            SDNN_EPISODE_PARAMETER const int32_t (&observation)[SDNN_N_OBSERVED],
+  void best(const sdnn_keeper& keeper, SDNN_EPISODE_PARAMETER observation_type observation,
             uint32_t (&action)[SDNN_N_DIMENSIONS]) const {
     sdnn_best(&agent_, &keeper, SDNN_EPISODE observation, action);
   }
@@ -53,14 +51,13 @@ class sdnn_learner {
   bool keep(sdnn_keeper& keeper, int64_t score) const {
     return sdnn_keep(&agent_, &keeper, score) != 0;
   }
-  void learn(const int32_t (&observation)[SDNN_N_OBSERVED], action_type action, int32_t reward,
-             const int32_t (&next_observation)[SDNN_N_OBSERVED], bool terminated) {
+  void learn(observation_type observation, action_type action, int32_t reward,
+             observation_type next_observation, bool terminated) {
     sdnn_learn(&agent_, observation, action, reward, next_observation, terminated);
   }
 #ifdef SDNN_DURATIONS_H
-  void learn_over(const int32_t (&observation)[SDNN_N_OBSERVED], action_type action, int32_t reward,
-                  const int32_t (&next_observation)[SDNN_N_OBSERVED], bool terminated,
-                  uint32_t dt) {
+  void learn_over(observation_type observation, action_type action, int32_t reward,
+                  observation_type next_observation, bool terminated, uint32_t dt) {
     sdnn_learn_over(&agent_, observation, action, reward, next_observation, terminated, dt);
   }
 #endif
@@ -68,11 +65,11 @@ class sdnn_learner {
   void set_progress(uint32_t progress) { sdnn_set_progress(&agent_, progress); }
 #endif
 #ifdef SDNN_IS_ACTOR_CRITIC
-  int64_t state_value(const int32_t (&observation)[SDNN_N_OBSERVED]) const {
+  int64_t state_value(observation_type observation) const {
     return sdnn_state_value(&agent_, observation);
   }
 #else
-  int64_t q(const int32_t (&observation)[SDNN_N_OBSERVED], action_type action) const {
+  int64_t q(observation_type observation, action_type action) const {
     return sdnn_q(&agent_, observation, action);
   }
 #endif

@@ -33,7 +33,7 @@ class QLambdaWriter(LinearWriter):
         weights, averaged = _WEIGHTS
         has_average = np.any(state.get("action_value.n_snapshots", 0))
         number, exponent = self.tolerance()
-        # Values, of a constant policy, count units of 2 to this power, and the tolerance too.
+        # The tolerance in the unit of values, whose exponent is in the agent's state.
         shift = exponent - int(state.get("action_value.exponent", 0))
         tolerance = min(number << shift if shift > 0 else number >> -shift, _MOST_TOLERANCE)
         defines = {**self.defines(), "TIE_TOLERANCE": f"INT64_C({tolerance})"}

@@ -59,6 +59,10 @@ class CHeader(Header):
 class Writer(ABC, Generic[Network]):
     """Makes the header of one agent; subclasses have its kind of network."""
 
+    title: ClassVar[str] = "the greedy policy of a trained agent"
+    has_durations = False
+    """Whether the header learns transitions of unequal durations."""
+
     def __init__(self, agent: ValueAgent[Any, Any], name: str, fraction_bits: int | None) -> None:
         self.agent, self.name = agent, name
         self.networks: list[Network] = agent.networks  # raises RuntimeError in a warm-up
@@ -74,10 +78,6 @@ class Writer(ABC, Generic[Network]):
         self.n_inputs = len(self.inputs) + len(self.history.added)
         self.n_observed = len(agent.observation_range[0])
         self.fraction_bits = self._checked_fraction_bits(fraction_bits)
-
-    title: ClassVar[str] = "the greedy policy of a trained agent"
-    has_durations = False
-    """Whether the header learns transitions of unequal durations."""
 
     @property
     def network(self) -> Network:
