@@ -12,9 +12,7 @@ import pytest
 
 from c_learners import (
     LEARNERS,
-    SMALL,
     actor,
-    actor_discrete,
     actor_running,
     actor_vector,
     build,
@@ -24,7 +22,6 @@ from c_learners import (
     lies_between,
     lines_of,
     network,
-    paper_rule,
     run_agent,
     run_program,
     sarsa,
@@ -39,7 +36,6 @@ from sdnn.agents import (
     SDNNActorCritic,
     SDNNQLambda,
     SDNNQLearning,
-    Transition,
 )
 from sdnn.export import c_header, load_image, save_image
 
@@ -310,75 +306,6 @@ def test_the_header_states_the_size_of_the_agent_in_memory(name, target, tmp_pat
     ram_bytes, kept_bytes = (int(number) for number in printed)
     assert ram_bytes == header.ram_bytes
     assert f"agent_keep keeps takes {kept_bytes:,} more" in header.text
-
-
-@pytest.mark.parametrize("make", [discrete, network, actor_discrete])
-def test_images_of_other_agents_are_refused_and_change_nothing(make):
-    agent, loaded = make(), make()
-    run_agent(agent, lines_of(agent, 300, 1, 16), 16)
-    image = save_image(agent)
-    before = save_image(loaded)
-    for position in range(0, len(image), len(image) // 97):
-        damaged = bytearray(image)
-        damaged[position] ^= 4
-        with pytest.raises(ValueError, match=r"damaged|another seed"):
-            load_image(loaded, bytes(damaged))
-    for of_wrong_size in (image[:-1], image + b"x", b""):
-        refuses("image", load_image, loaded, of_wrong_size)
-    refuses("image", load_image, loaded, 3, error=TypeError)
-    refuses("image", load_image, sarsa(), image)
-    refuses("image", load_image, paper_rule(), image)
-    config = replace(SMALL, averaging_interval=8)
-    with_averages = SDNNQLambda(
-        box(1.0, 2.0, 3.0), gym.spaces.Discrete(3, start=-1), seed=1, approximator=config,
-        inputs="all", angle_pairs=[],
-    )  # fmt: skip
-    refuses("image", load_image, with_averages, image)
-    assert save_image(loaded) == before
-    load_image(loaded, image)
-    assert save_image(loaded) == image
-
-
-def test_an_image_of_a_linear_agent_with_impossible_numbers_is_refused():
-    agent, same = discrete(), discrete()
-    lines = lines_of(agent, 300, 1, 16)
-    for trained in (agent, same):
-        run_agent(trained, lines[:-1], 16)
-        trained.act([0.1, 0.2, 0.3])
-        trained.learn(Transition([0.1, 0.2, 0.3], 0, 1.0, [0.2, 0.2, 0.3], False))
-    # n_snapshots, n_ended, n_learned, n_steps
-    for number in (slice(12, 16), slice(20, 24), slice(24, 32), slice(32, 40)):
-        forged = bytearray(save_image(agent))
-        forged[number] = b"\xff" * len(forged[number])
-        forged[-4:] = zlib.crc32(forged[:-4]).to_bytes(4, "little")
-        refuses("image", load_image, agent, bytes(forged))
-    states = agent._state_of("agent"), same._state_of("agent")
-    assert all(np.array_equal(states[0][name], states[1][name]) for name in states[1])
-    # An image of a new agent replaces everything that was learned.
-    new = discrete()
-    load_image(agent, save_image(new))
-    actions = run_agent(agent, lines, 16)
-    assert actions == run_agent(new, lines, 16)
-    assert save_image(agent) == save_image(new)
-
-
-def test_an_image_of_a_network_with_impossible_numbers_is_refused():
-    agent = network()
-    before = save_image(agent)
-    first = len(before) - 4 - 4 * c_header(agent, "agent", learning=True).n_words
-    # Fraction bits, a stream, the size of rewards, progress, the range of values, when a return is
-    # due, returns, a byte of 0, sums that are odd.
-    streams = slice(16, 48)
-    places = [(11, 255), (streams, 0), (187, 15), (203, 255), (211, 255), (259, 1), (263, 255)]
-    for place, byte in (*places, (first, 0), (first, 1)):
-        forged = bytearray(before)
-        if place == streams:
-            forged[place] = bytes(32)
-        else:
-            forged[place] = before[place] ^ 1 if byte == 1 else byte
-        forged[-4:] = zlib.crc32(forged[:-4]).to_bytes(4, "little")
-        refuses("image", load_image, agent, bytes(forged))
-        assert save_image(agent) == before
 
 
 REAL_NUMBERS = """
