@@ -99,12 +99,10 @@ class RiverRegressor(StreamEstimator, base.Regressor):
             return mean
         return float(sum(y / len(self.targets) for y in self.targets))  # their sum may overflow
 
-    def learn_one(self, x: Features, y: Target) -> None:
-        """Learn one sample; an error changes nothing."""
-        sample = cleaned_sample(x)
-        self._check_target(y)
+    def _learn_checked(self, sample: Sample, y: Target) -> None:
+        """Learn a sample, and the error of the prediction before it."""
         difference = float(y) - self._predict(sample)  # may overflow
-        super().learn_one(x, y)
+        super()._learn_checked(sample, y)
         self.errors.learn(min(abs(difference), sys.float_info.max))
 
     @overload

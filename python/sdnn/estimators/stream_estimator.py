@@ -152,6 +152,10 @@ class StreamEstimator:
         self._require_same_settings()
         sample = cleaned_sample(x)
         self._check_target(y)
+        self._learn_checked(sample, y)
+
+    def _learn_checked(self, sample: Sample, y: Target) -> None:
+        """Learn a cleaned sample and its checked target; an error changes nothing."""
         if self.fitted is not None:
             estimates = None if self.mixed is None else self._estimates(sample)
             self._learn(self._sample(sample, learns=True), y)
