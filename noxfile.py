@@ -108,17 +108,11 @@ def run_cpp_tests(session, preset):
 
 @quick()
 def demonstration(session):
-    """Compile cpp/wasm for the site's page on which agents learn in a browser.
-
-    The C headers are of agents whose sensors have 1, 2 and 3 copies.
-    """
+    """Compile cpp/wasm for the site's page on which agents learn in a browser."""
     folder = ROOT / "build" / "demonstration"
     headers = folder / "headers"
     headers.mkdir(parents=True, exist_ok=True)
-    ranges = ("--range=-2.4:2.4", "--range=-3:3", "--range=-0.21:0.21", "--range=-3.5:3.5")
-    for copies, ram in enumerate((20_000, 60_000, 120_000), 1):
-        header = ("--actions=2", f"--ram={ram}", f"--c-header={headers}/pole{copies}.h")
-        python(session, "-m", "sdnn", "export", "--new", *ranges * copies, *header)
+    export_pole_headers(session, headers)
     eigen = (Path(path, "cmeel.prefix", "include", "eigen3") for path in sys.path)
     folders = (ROOT / "cpp" / "include", ROOT / "cpp", headers, *filter(Path.is_dir, eigen))
     flags = ["-target", "wasm32-wasi", "-mexec-model=reactor", "-msimd128", "-fno-exceptions", "-s"]
@@ -128,6 +122,15 @@ def demonstration(session):
     for name, level in (("acrobot", "-O3"), ("pole", "-Os")):
         files = (ROOT / "cpp" / "wasm" / f"{name}.cpp", "-o", folder / f"{name}.wasm")
         python(session, "-m", "ziglang", "c++", level, *flags, *files)
+
+
+def export_pole_headers(session, folder):
+    """Write pole1.h to pole3.h: agents that balance a pole with 1 to 3 copies of each sensor."""
+    # Cart position in m and speed in m/s, pole angle in rad and speed in rad/s.
+    ranges = ("--range=-2.4:2.4", "--range=-3:3", "--range=-0.21:0.21", "--range=-3.5:3.5")
+    for copies, ram_bytes in enumerate((20_000, 60_000, 120_000), 1):
+        header = ("--actions=2", f"--ram={ram_bytes}", f"--c-header={folder}/pole{copies}.h")
+        python(session, "-m", "sdnn", "export", "--new", *ranges * copies, *header)
 
 
 @quick()
@@ -146,14 +149,21 @@ def docs(session):
 def docs_weekly(session):
     """Run the blocks of the documents that take more than a minute, an hour in all."""
     os.environ["SDNN_WEEKLY"] = "1"
-    pytest(session, "tests/docs/test_pages.py", "-k", "long_blocks")
+    pytest(session, "tests/docs/test_pages.py::test_the_weekly_code_blocks_of_a_page_run")
 
 
-SHORT_TESTS = (
-    "core/test_config.py", "core/test_lazy.py", "estimators/test_files.py",
-    "estimators/test_online.py", "estimators/test_river.py", "estimators/test_scikit_learn.py",
-    "agents/test_saving.py", "agents/test_habits.py", "runs/test_run.py", "runs/test_spec.py",
-)  # fmt: skip
+SHORT_TESTS = [
+    "tests/python/core/test_config.py",
+    "tests/python/core/test_lazy.py",
+    "tests/python/estimators/test_files.py",
+    "tests/python/estimators/test_online.py",
+    "tests/python/estimators/test_river.py",
+    "tests/python/estimators/test_scikit_learn.py",
+    "tests/python/agents/test_saving.py",
+    "tests/python/agents/test_habits.py",
+    "tests/python/runs/test_run.py",
+    "tests/python/runs/test_spec.py",
+]
 
 
 @quick()
@@ -166,27 +176,30 @@ def newest(session):
 @nox.parametrize("resolution", ["lowest-direct", "highest"])
 def versions(session, resolution):
     """Run all tests on the oldest and the newest Python, with the oldest and newest packages."""
-    test_with(session, interpreters()[-1 if resolution == "highest" else 0], resolution, "")
+    interpreter = interpreters()[-1 if resolution == "highest" else 0]
+    test_with(session, interpreter, resolution, "tests/python")
 
 
 def interpreters():
     """Return the supported Pythons on the path and of pyenv, the oldest first."""
     pyenv = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv"))
     folders = [*map(str, pyenv.glob("versions/*/bin")), os.environ["PATH"]]
-    names = (f"python3.{minor}" for minor in range(11, 15))
+    names = (f"python3.{minor}" for minor in range(11, 15))  # 3.11 to 3.14
     paths = (shutil.which(name, path=os.pathsep.join(folders)) for name in names)
     return list(filter(None, paths))
 
 
 def test_with(session, interpreter, resolution, *tests):
-    """Install the package and its tests in an environment of another Python, and run tests."""
+    """Run tests on another Python, with the lowest or highest versions that the package allows.
+
+    The environment is made by uv. Its `resolution` is "lowest-direct" or "highest".
+    """
     python_of = Path(session.create_tmp(), resolution, "bin", "python")
     uv = [sys.executable, "-m", "uv"]
     session.run(*uv, "venv", "--clear", f"--python={interpreter}", python_of.parents[1])
     install = [*uv, "pip", "install", "-q", f"--python={python_of}", f"--resolution={resolution}"]
     session.run(*install, "--reinstall-package=sdnn-learn", ".[test]")
-    paths = [str(Path("tests", "python", name)) for name in tests]
-    session.run(python_of, "-m", "pytest", "-q", *paths, *session.posargs, external=True)
+    session.run(python_of, "-m", "pytest", "-q", *tests, *session.posargs, external=True)
 
 
 @weekly()
@@ -266,7 +279,8 @@ def tidy(session):
     """Run clang-tidy over the headers and the C++ tests; check what headers include."""
     session.run("cmake", "--preset", "tidy", external=True)
     session.run("run-clang-tidy.py", "-quiet", "-p", "build/tidy", f"-j{JOBS}")
-    # A header includes what it uses. The check looks at main files only.
+    # Each header must include what it uses. The check looks at main files only, so it gets the
+    # headers as main files.
     headers = [name for name in cpp_sources() if re.search(r"cpp/(include|tools)/.*hpp$", name)]
     flags = ["-xc++", "-std=c++20", "-ffp-contract=off", "-DSDNN_NO_CONTRACTION"]
     flags += [f"-I{ROOT}/cpp/include", f"-I{ROOT}/cpp", "-isystem/usr/include/eigen3"]
