@@ -1,6 +1,6 @@
 # sdnn::agent_files is sdnn::sdnn and nlohmann/json, which the headers of saved agents include
-# (core/safetensors.hpp, agents/agent_file.hpp). sdnn::controller is the
-# library behind agents/compiled_controller.hpp, compiled with the first program that is linked to it.
+# (core/safetensors.hpp, agents/agent_file.hpp). sdnn::controller is the library behind
+# agents/compiled_controller.hpp; it is compiled only if a program links to it.
 find_package(nlohmann_json 3.9 CONFIG QUIET)
 if(TARGET nlohmann_json::nlohmann_json AND NOT TARGET sdnn::agent_files)
   add_library(sdnn::agent_files INTERFACE IMPORTED GLOBAL)
@@ -15,7 +15,8 @@ if(TARGET nlohmann_json::nlohmann_json AND NOT TARGET sdnn::agent_files)
     add_library(sdnn::controller ALIAS sdnn_controller)
   endif()
 elseif(NOT TARGET nlohmann_json::nlohmann_json)
-  # Whoever links to them reads why there is nothing: CMake shows an expression that it cannot evaluate.
+  # CMake stops at an expression $<...> that it cannot evaluate and shows it: that is the error message of a
+  # project that links to a target without nlohmann/json. Others configure without an error.
   foreach(sdnn_target sdnn::agent_files sdnn::controller)
     add_library(${sdnn_target} INTERFACE IMPORTED GLOBAL)
     set_property(TARGET ${sdnn_target} PROPERTY INTERFACE_LINK_LIBRARIES

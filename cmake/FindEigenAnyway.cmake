@@ -1,5 +1,5 @@
-# Finds Eigen >= 3.4 wherever it comes from: a system package, or the PyPI wheel `cmeel-eigen`,
-# below CMAKE_PREFIX_PATH or in the Python that the shell would start, as an active environment's.
+# Finds Eigen >= 3.4: a system package, or the PyPI wheel `cmeel-eigen`, below CMAKE_PREFIX_PATH or in the
+# Python that the shell would start. Makes the target Eigen3::Eigen, or sets sdnn_eigen_missing to an error.
 macro(_sdnn_find_eigen)
   # One major version at a time, because the configuration file of Eigen 3.4.0 refuses ranges.
   foreach(_sdnn_eigen_version 3.4 5)
@@ -20,7 +20,7 @@ if(NOT TARGET Eigen3::Eigen)
     _sdnn_find_eigen(HINTS "${_sdnn_site_packages}")
   endif()
 endif()
-set(sdnn_eigen_missing "")  # what to say of it
+set(sdnn_eigen_missing "")
 if(NOT TARGET Eigen3::Eigen)
   string(CONCAT sdnn_eigen_missing
     "sdnn needs Eigen >= 3.4: pip install cmeel-eigen, apt install libeigen3-dev, "
