@@ -1,14 +1,14 @@
 """Run the code of a page from top to bottom, in order: ``python tests/docs/run_page.py PAGE``.
 
-Blocks in ``python`` share their names, blocks in ``sh`` their folder: a temporary one that looks
-like a clone, with a copy of ``docs``. Other blocks, and those in Python too, are written to the
-file that their first line names (``# docking.py``, ``// main.c``). A comment before a block says
-when it is not run at once::
+Blocks in ``python`` share their global names, blocks in ``sh`` their folder: a temporary one that
+looks like a clone, with a copy of ``docs``. A block whose first line names a file, as
+``# docking.py`` does, is written to it; blocks in languages that are not run must name one. A
+comment before a block is its mark, and restricts when it is run::
 
-    <!-- needs: gcc -->            where something is missing that NEEDS looks for
-    <!-- weekly: 3 minutes -->     it takes more than a minute, as python bench/... does; run with
-                                   --weekly
-    <!-- not run: needs SLURM -->  never, as whatever installs something
+    <!-- needs: gcc -->            only if all names, listed in NEEDS, are available
+    <!-- weekly: 3 minutes -->     only with --weekly, because it takes more than a minute; also
+                                   without a mark if it begins with "python bench/"
+    <!-- not run: needs SLURM -->  never; required for blocks that install something
 
 ``--list`` counts the blocks of all pages.
 """
@@ -42,23 +42,32 @@ _NAME = re.compile(r"(?:#|//) ([\w/-]+\.\w+)$", re.M)
 
 
 class Block(NamedTuple):
-    """A block of a page: its line, language, text, and what a comment says of it."""
+    """A block of a page."""
 
     line: int
+    """The number of the line ```LANGUAGE, from 1."""
     language: str
     text: str
     mark: str = ""
+    """The word "needs", "weekly" or "not run", or "" without a comment."""
     reason: str = ""
+    """The text after the mark in the comment."""
 
 
 def pages() -> list[Path]:
-    """List the pages with code, by their names."""
+    """List the pages that have code, sorted by their paths."""
     paths = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
     return [page for page in paths if any(b.language not in SHOWN for b in blocks(page))]
 
 
 def blocks(page: Path) -> list[Block]:
-    """List the blocks of a page; ValueError for a language or a mark that nobody knows."""
+    """List the blocks of a page.
+
+    Raises
+    ------
+    ValueError
+        If a language or a mark is unknown, or a block lacks the name of a file or a mark.
+    """
     text = page.read_text("utf-8")
     blocks_of_page = []
     for match in _BLOCK.finditer(text):
@@ -80,25 +89,25 @@ def blocks(page: Path) -> list[Block]:
     return blocks_of_page
 
 
-def _command(*arguments: str) -> Callable[[], bool]:
-    def is_there() -> bool:
-        return subprocess.run(arguments, capture_output=True, check=False).returncode == 0
-
-    return is_there
+def _is_sdnn_installed() -> bool:
+    """Return whether the package is installed: only then its CMake files are beside it."""
+    command = [sys.executable, "-m", "sdnn", "--cmakedir"]
+    return subprocess.run(command, capture_output=True, check=False).returncode == 0
 
 
 NEEDS: dict[str, Callable[[], bool]] = {
     "gcc": lambda: shutil.which("gcc") is not None,
     "cmake": lambda: shutil.which("cmake") is not None,
     "nlohmann/json": Path("/usr/include/nlohmann/json.hpp").exists,
-    "an installed package": _command(sys.executable, "-m", "sdnn", "--cmakedir"),
+    "an installed package": _is_sdnn_installed,
 }
+"""Functions that return whether a need is available, by the names in marks."""
 
 
 def missing(block: Block) -> list[str]:
     """List what a block needs and this machine lacks."""
-    wanted = block.reason.split(", ") if block.mark == "needs" else []
-    return [name for name in wanted if not NEEDS[name]()]
+    needed = block.reason.split(", ") if block.mark == "needs" else []
+    return [name for name in needed if not NEEDS[name]()]
 
 
 def is_due(block: Block, *, weekly: bool) -> bool:
@@ -122,8 +131,11 @@ def make_folder(folder: Path) -> dict[str, str]:
 
 
 def run(page: Path, *, weekly: bool) -> Iterator[tuple[Block, float, list[str]]]:
-    """Run a page in the present folder; yield blocks with their seconds, or what they lack."""
-    names: dict[str, Any] = {"__name__": "__main__"}
+    """Run a page in the current folder; yield each block, its seconds, and the needs it lacks.
+
+    A block that lacks something is written to its file, but not run.
+    """
+    global_names: dict[str, Any] = {"__name__": "__main__"}
     for block in blocks(page):
         if block.language in SHOWN or not is_due(block, weekly=weekly):
             continue
@@ -137,14 +149,14 @@ def run(page: Path, *, weekly: bool) -> Iterator[tuple[Block, float, list[str]]]
             path.write_text(block.text, "utf-8")
         if block.language == "python" and not lacks:
             where = f"{page.name} from line {block.line + 1}"
-            exec(compile(block.text, where, "exec"), names)
+            exec(compile(block.text, where, "exec"), global_names)
         elif block.language == "sh" and not lacks:
             _run_shell(block.text)
         yield block, time.perf_counter() - begin, lacks
 
 
 def _run_shell(text: str) -> None:
-    """Run a block in sh; end what it leaves in the background."""
+    """Run a block in sh, and end the processes that it leaves in the background."""
     command = ["bash", "-euo", "pipefail", "-c", text]
     shell = subprocess.Popen(command, start_new_session=True)
     try:
@@ -179,8 +191,8 @@ def main() -> None:
         os.chdir(folder)
         sys.path[:0] = [folder]
         for block, seconds, lacks in run(page, weekly=options.weekly):
-            what = f"left out, needs {', '.join(lacks)}" if lacks else f"{seconds:.1f} s"
-            print(f"{page.name}:{block.line} {block.language}: {what}", flush=True)
+            outcome = f"left out, needs {', '.join(lacks)}" if lacks else f"{seconds:.1f} s"
+            print(f"{page.name}:{block.line} {block.language}: {outcome}", flush=True)
         os.chdir(ROOT)
 
 

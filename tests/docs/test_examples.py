@@ -27,7 +27,7 @@ SCRIPTS = sorted(path for path in FOLDER.glob("*.py") if path not in (MAKER, *PA
 
 
 def run(script, folder, *options):
-    """Return the output of a script."""
+    """Run a script in a folder; return what it prints."""
     process = subprocess.run(
         [sys.executable, "-W", "ignore", script, *options],
         cwd=folder,
@@ -41,7 +41,7 @@ def run(script, folder, *options):
 
 
 def numbers(pattern, printed):
-    """The numbers in the place of a pattern's groups."""
+    """Return the numbers that the groups of a pattern match in a text."""
     match = re.search(pattern, printed)
     assert match, printed
     return [float(number) for number in match.groups()]
@@ -58,40 +58,43 @@ def test_the_transcription_of_q_lambda_runs_with_its_options(tmp_path):
     assert run(Q_LAMBDA, tmp_path, *options).startswith("step 999: return -")
 
 
-class Recorded(gym.Wrapper):
-    """Keeps observations after resets, and actions with transitions after steps."""
+class Recorder(gym.Wrapper):
+    """Wrapper that records each episode: a list of its transitions."""
 
     def __init__(self, env):
         super().__init__(env)
-        self.history = []
+        self.episodes = []
 
     def reset(self, **options):
-        observation, info = super().reset(**options)
-        self.history.append((observation,))
-        return observation, info
+        self.observation, info = super().reset(**options)
+        self.episodes.append([])
+        return self.observation, info
 
     def step(self, action):
         outcome = super().step(action)
-        self.history.append((action, *outcome[:4]))
+        next_observation, reward, terminated, *_ = outcome
+        transition = Transition(self.observation, action, reward, next_observation, terminated)
+        self.episodes[-1].append(transition)
+        self.observation = next_observation
         return outcome
 
 
 def trained_as_on_page(page, agent_class, env_id, n_steps):
-    """Return the page's agent, and the library's after the same steps."""
-    env = Recorded(gym.make(env_id))
-    agent_of_page = page.train(env, page.Settings(steps=n_steps, seed=7), str)
+    """Train the agent of a page, and the library's with its transitions; return both.
+
+    Checks that in each step the library's agent chooses the action of the page's.
+    """
+    env = Recorder(gym.make(env_id))
+    agent_of_page = page.train(env, page.Settings(steps=n_steps, seed=7), report=str)
     space = env.observation_space
     ranges = tuple(np.clip(bound.astype(float), -3, 3) for bound in (space.low, space.high))
     options = {"observation_range": ranges, "inputs": "all", "angle_pairs": "none"}
     agent = agent_class(env, seed=7, **options)
-    for action, *outcome in env.history:
-        if not outcome:
-            agent.begin_episode()
-            observation = action
-            continue
-        np.testing.assert_array_equal(agent.act(observation), action)
-        agent.learn(Transition(observation, action, outcome[1], outcome[0], outcome[2]))
-        observation = outcome[0]
+    for episode in env.episodes:
+        agent.begin_episode()
+        for transition in episode:
+            np.testing.assert_array_equal(agent.act(transition.observation), transition.action)
+            agent.learn(transition)
     return agent_of_page, agent
 
 
@@ -101,8 +104,8 @@ def trained_as_on_page(page, agent_class, env_id, n_steps):
 def test_the_transcription_of_q_lambda_has_the_weights_of_the_library(env_id, n_steps):
     page, agent = trained_as_on_page(sdnn_q_lambda, SDNNQLambda, env_id, n_steps)
     state = agent.state()
-    for name, numbers in (("weights", page.weights), ("averaged_weights", page.average)):
-        np.testing.assert_array_equal(state[f"agent.action_value.{name}"], numbers)
+    np.testing.assert_array_equal(state["agent.action_value.weights"], page.weights)
+    np.testing.assert_array_equal(state["agent.action_value.averaged_weights"], page.average)
     assert state["agent.action_value.exponent"] == page.exponent
     assert np.abs(page.weights).max() > 2**20, "something was learned"
 
@@ -123,7 +126,7 @@ def test_cited_sections_of_the_method_exist():
     root = FOLDER.parents[1]
     method = (root / "docs" / "explanation" / "method.md").read_text("utf-8")
     sections = set(re.findall(r"^#+ ([\d.]*\d)", method, re.MULTILINE))
-    cited = set(re.findall(r"\(([1-9](?:\.\d)?)[,)]", PAGE.read_text("utf-8")))
+    cited = set(re.findall(r"\(([1-9](?:\.\d)?)[,)]", PAGE.read_text("utf-8")))  # (5) and (1.2)
     assert len(cited) > 8
     for path in (*(root / "cpp").rglob("*.hpp"), *(root / "python").rglob("*.py")):
         for numbers in re.findall(r"method\.md, sections? ([\d. and]+)", path.read_text("utf-8")):
@@ -132,8 +135,8 @@ def test_cited_sections_of_the_method_exist():
 
 
 def test_the_acrobot_example_solves_80_percent_of_episodes(tmp_path):
-    solved, of = numbers(r"in the last (20): (\d+)", run(FOLDER / "acrobot.py", tmp_path))[::-1]
-    assert solved >= 0.8 * of
+    (n_solved,) = numbers(r"in the last 20: (\d+)", run(FOLDER / "acrobot.py", tmp_path))
+    assert n_solved >= 0.8 * 20
 
 
 def test_the_custom_environment_example_beats_its_rule(tmp_path):
@@ -145,9 +148,9 @@ def test_the_custom_environment_example_beats_its_rule(tmp_path):
 
 def test_the_noise_example_solves_more_with_robust_than_with_paper(tmp_path):
     printed = run(FOLDER / "noisy_sensors.py", tmp_path)
-    shares = re.findall(r"(paper|robust), seed \d: solved (\d+)%", printed)
-    of = {preset: [int(s) for name, s in shares if name == preset] for preset in dict(shares)}
-    assert min(of["robust"]) > max(of["paper"])
+    robust = [int(share) for share in re.findall(r"robust, seed \d: solved (\d+)%", printed)]
+    paper = [int(share) for share in re.findall(r"paper, seed \d: solved (\d+)%", printed)]
+    assert min(robust) > max(paper)
 
 
 def test_the_arm_example_reduces_its_distance_to_a_third(tmp_path):
@@ -159,10 +162,10 @@ def test_the_arm_example_reduces_its_distance_to_a_third(tmp_path):
 
 def test_the_drift_example_follows_the_drift_online(tmp_path):
     printed = run(FOLDER / "drifting_regression.py", tmp_path)
-    r2, most = numbers(r"cross-validation: ([.\d]+); noise allows ([.\d]+)", printed)
-    assert 0.9 < r2 < most
+    r2, highest_r2 = numbers(r"cross-validation: ([.\d]+); noise allows ([.\d]+)", printed)
+    assert 0.9 < r2 < highest_r2
     before, fixed = numbers(r"stays as it is: error ([.\d]+) before the drift, ([.\d]+)", printed)
-    online = numbers(r"keeps learning: error [.\d]+ before the drift, ([.\d]+)", printed)[0]
+    (online,) = numbers(r"keeps learning: error [.\d]+ before the drift, ([.\d]+)", printed)
     assert fixed > 4 * before
     assert online < 1.5 * before
 
@@ -197,10 +200,12 @@ def test_every_example_is_tested_and_listed():
 def test_notebooks_have_the_cells_of_their_scripts(script):
     pytest.importorskip("jupytext")
     notebook = runpy.run_path(str(MAKER))["notebook_of"](script)
-    pieces = re.split(r"^# %%(.*)\n", script.read_text(), flags=re.MULTILINE)
-    assert pieces[0] == ""
+    # The parts before the first line "# %%" (none), and then in turn what follows "# %%" in the
+    # line, which is " [markdown]" or nothing, and the text of the cell.
+    before, *parts = re.split(r"^# %%(.*)\n", script.read_text(), flags=re.MULTILINE)
+    assert before == ""
     cells = []
-    for cell_type, text in zip(pieces[1::2], pieces[2::2], strict=True):
+    for cell_type, text in zip(parts[::2], parts[1::2], strict=True):
         if cell_type == " [markdown]":
             text = re.sub(r"^# ?", "", text, flags=re.MULTILINE)
         cells.append(("markdown" if cell_type else "code", text.strip()))
