@@ -1,4 +1,4 @@
-"""Checks of arguments: types of numbers, and the argument that an error carries."""
+"""Checks of arguments: types of numbers, and errors that carry the name of the argument."""
 
 import gymnasium as gym
 import numpy as np
@@ -37,7 +37,7 @@ def test_real_accepts_numbers_of_python_and_numpy(value):
 )
 def test_errors_of_checks_carry_argument_and_problem(check, values, problem):
     with pytest.raises((TypeError, ValueError)) as caught:
-        check("size", *values)
+        check("size", *values)  # the value, and for `whole` its bounds
     assert arguments.blamed(caught.value) == ("size", problem)
 
 

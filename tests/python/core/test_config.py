@@ -30,8 +30,8 @@ def other_value(field):
         return not field.default
     if field.hint.startswith("tuple"):
         return (True,) if "bool" in field.hint else (1, 0)
-    number = field.default or 0
-    for candidate in (number + 1, number / 2, number - 1, 0.5):
+    default = field.default or 0  # instead of None
+    for candidate in (default + 1, default / 2, default - 1, 0.5):
         is_of_type = "float" in field.hint or candidate == int(candidate)
         if is_of_type and field.low < candidate <= field.high:
             return candidate
@@ -45,7 +45,7 @@ def test_each_field_is_kept_by_copies_pickles_and_replace(config_class, field):
     assert getattr(config_class(), field.name) == field.default
     assert getattr(settings, field.name) == value != field.default
     assert settings != config_class()
-    # A whole value of a float is shown with ".0".
+    # Fields of floats show the whole value 3 as "3.0".
     assert f"{field.name}={value!r}" in repr(settings).replace(f"{value}.0", f"{value}")
     for copied in (
         pickle.loads(pickle.dumps(settings)),
@@ -60,7 +60,8 @@ def test_each_field_is_kept_by_copies_pickles_and_replace(config_class, field):
 
 @pytest.mark.parametrize(("config_class", "field"), FIELDS, ids=IDS)
 def test_bad_values_of_each_field_are_refused_with_its_name(config_class, field):
-    bad_values = ["four", b"x", object(), 5 if field.hint == "bool" else True]
+    bad_values = ["four", b"x", object()]
+    bad_values.append(5 if field.hint == "bool" else True)  # flags are no numbers
     if not field.hint.startswith("tuple"):  # an empty dict is an empty sequence, too
         bad_values.append({})
     if not field.hint.endswith("None"):
@@ -69,6 +70,7 @@ def test_bad_values_of_each_field_are_refused_with_its_name(config_class, field)
         bad_values += [math.nan, math.inf, 10**400]
         if field.excludes_low:
             bad_values.append(field.low)
+        # Values beyond the bounds, by so much that a large bound is not rounded to itself.
         if math.isfinite(field.low):
             bad_values.append(field.low - 1 - abs(field.low))
         if math.isfinite(field.high):

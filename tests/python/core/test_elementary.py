@@ -1,4 +1,8 @@
-"""The portable elementary functions against mpmath with 200 bits."""
+"""The portable elementary functions against mpmath with 200 bits.
+
+The limits are a little above the largest errors measured (see elementary.hpp), in units of the last
+place (ulp): half a unit is the error of the best rounding.
+"""
 
 import mpmath
 import numpy as np
@@ -8,13 +12,13 @@ from sdnn import _core
 
 
 @pytest.fixture(autouse=True)
-def precision():
+def precision_of_200_bits():
     with mpmath.workprec(200):
         yield
 
 
 def largest_error(results, function, *arguments):
-    """Return the largest error in units of the last place of the exact value."""
+    """Return the largest error of results of a function of mpmath, in ulp of the exact value."""
     errors = []
     for result, *numbers in zip(results, *arguments, strict=True):
         exact = function(*(mpmath.mpf(float(number)) for number in numbers))
@@ -23,7 +27,10 @@ def largest_error(results, function, *arguments):
 
 
 def angles_up_to(limit, n, seed):
-    """Return uniform angles, and neighbours of multiples of pi/2, where digits cancel."""
+    """Return n uniform angles, and about n / 4 doubles next to multiples of pi / 2.
+
+    Digits cancel at these, as a sine or a cosine is almost 0.
+    """
     rng = np.random.default_rng(seed)
     multiples = rng.integers(1, int(limit * 2 / np.pi) + 2, n // 4)
     neighbours = np.array([float(int(k) * mpmath.pi / 2) for k in multiples])
@@ -49,7 +56,7 @@ def test_the_logarithm_is_within_085_units_of_the_last_place():
         [
             rng.uniform(0.0, 1.0, 3000),
             rng.uniform(0.5, 2.0, 4000),
-            np.exp(rng.uniform(-744.0, 709.0, 3000)),
+            np.exp(rng.uniform(-744.0, 709.0, 3000)),  # the whole range of doubles
             1.0 + rng.uniform(-1e-5, 1e-5, 1000),
         ]
     )
@@ -62,11 +69,13 @@ def test_the_exponential_is_within_07_units_of_the_last_place_or_1_where_it_is_s
         [rng.uniform(-708.0, 709.7, 3000), rng.uniform(-1.0, 1.0, 4000), rng.uniform(-30, 0, 3000)]
     )
     assert largest_error(_core.exp(x), mpmath.exp, x) < 0.7
-    x = rng.uniform(-745.0, -708.5, 500)
+    x = rng.uniform(-745.0, -708.5, 500)  # with subnormal results, which have fewer bits
     assert largest_error(_core.exp(x), mpmath.exp, x) < 1.0
 
 
 def test_powers_have_relative_errors_that_grow_with_the_logarithm_of_the_result():
+    # The bound that elementary.hpp states is (2 + |y log x|) 2^-52; y log x is the logarithm of
+    # the power.
     rng = np.random.default_rng(6)
     base, exponent = rng.uniform(0.0, 1.0, 4000), 10.0 ** rng.uniform(-3.0, 2.0, 4000)
     for x, y, power in zip(base, exponent, _core.power(base, exponent), strict=True):
@@ -88,7 +97,8 @@ def test_normal_quantile_inverts_the_distribution_function():
     rng = np.random.default_rng(3)
     p = np.concatenate([rng.uniform(0.0, 1.0, 300), 10.0 ** rng.uniform(-300.0, 0.0, 200)])
     for probability, quantile in zip(p, _core.normal_quantile(p), strict=True):
+        # Newton's method doubles the right digits in each step, from about 15 in the result.
         exact = mpmath.mpf(float(quantile))
-        for _ in range(3):  # Newton from an almost exact start
+        for _ in range(3):
             exact -= (mpmath.ncdf(exact) - float(probability)) / mpmath.npdf(exact)
         assert abs(float(quantile) / exact - 1) < 1e-15

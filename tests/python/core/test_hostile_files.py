@@ -1,4 +1,4 @@
-"""Malicious and damaged files: readers refuse them by name, and links to other files are kept."""
+"""Malicious and damaged files: readers refuse them by name, and leave all other files alone."""
 
 import os
 import sqlite3
@@ -29,21 +29,23 @@ RUN = RunSpec(
     protocol={"evaluate_every": 10, "evaluation_episodes": 1},
 )
 
-EPISODE_ROWS = [
+ROWS_IN_PROGRESS = [
     {"kind": "episode", "step": 3 * n, "episode": n, "return": -1.5, "length": 3,
      "terminated": True}
     for n in range(40)
 ]  # fmt: skip
 
 
+KEY_IN_PROGRESS = make_record(7).key
+
+
 def make_store(folder):
-    """Make a store of 4 finished trials, a training in progress and a measurement."""
+    """Make a store of 4 trials, a training in progress and a measurement; return its path."""
     with ResultStore(folder) as store:
         for trial in range(4):
             store.add(make_record(trial, steps=range(1, 40)))
-        key = make_record(7).key
-        rows = TrialRows.from_training(EPISODE_ROWS)
-        store.extend(key, rows, 0, config="{}", version="0.1")
+        rows = TrialRows.from_training(ROWS_IN_PROGRESS)
+        store.extend(KEY_IN_PROGRESS, rows, 0, config="{}", version="0.1")
         store.put("cost", "a", {"value": [1, None]})
         return store.path
 
@@ -55,7 +57,7 @@ def content_of(folder, **options):
         return (
             [replace(record, rows=None) for record in records],
             [record.rows.table.tolist() for record in records],
-            store.rows(make_record(7).key).table.tolist(),
+            store.rows(KEY_IN_PROGRESS).table.tolist(),
             store.keys(),
             store.seconds(),
             store.measurements("cost"),
@@ -66,18 +68,17 @@ def test_a_flipped_bit_of_a_store_is_noticed_or_changes_nothing_that_is_read(tmp
     path = make_store(tmp_path)
     content, expected = path.read_bytes(), content_of(tmp_path)
     rng = np.random.default_rng(5)
-    n_noticed = 0
+    errors = []
     for position in rng.integers(0, len(content), 300):
         flipped = bytearray(content)
         flipped[position] ^= 1 << int(rng.integers(8))
         path.write_bytes(flipped)
         try:
-            read = content_of(tmp_path)
+            assert content_of(tmp_path) == expected
         except StoreError as error:
-            n_noticed += str(path) in str(error)
-        else:
-            assert read == expected
-    assert n_noticed > 50, "of 300 bits, many of which lie in unused parts of pages"
+            errors.append(str(error))
+    assert len(errors) > 50, "of 300 bits, many of which lie in unused parts of pages"
+    assert all(str(path) in error for error in errors)
 
 
 def test_half_a_store_is_refused_as_damaged(tmp_path):
@@ -88,13 +89,14 @@ def test_half_a_store_is_refused_as_damaged(tmp_path):
 
 
 def execute_sql(path, *statements):
+    """Execute statements as another program would."""
     connection = sqlite3.connect(path)
     connection.executescript(";".join(statements))
     connection.close()
 
 
 ENDLESS = "WITH RECURSIVE n(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM n) SELECT"
-"""The begin of a query whose rows never end."""
+"""The beginning of a query whose rows never end."""
 
 
 @pytest.mark.parametrize(
@@ -167,22 +169,19 @@ def test_a_stored_configuration_must_have_its_hash(tmp_path):
             store.load()
 
 
-def test_a_journal_rolls_back_but_cannot_remove_other_files(tmp_path):
+def test_a_journal_cannot_make_sqlite_remove_another_file(tmp_path):
     path, other_file = make_store(tmp_path), tmp_path / "mine.txt"
-    expected = content_of(tmp_path)
-    journal = hot_journal(path)
-    journal_bytes, store_bytes = journal.read_bytes(), path.read_bytes()
-    assert content_of(tmp_path) == expected, "rolled back"
-    # SQLite removes the file that a journal names as that of a transaction over several files.
     other_file.write_bytes(b"mine")
-    # Such a record has the number of the page at 1 GiB, the file's name, its length and checksum,
-    # and the 8 bytes with which a journal begins.
+    journal = hot_journal(path)
+    content = journal.read_bytes()
+    # SQLite removes the file that a journal names as that of a transaction over several databases.
+    # Its record at the end has the number of the page at 1 GiB, the file's name, its length, the
+    # sum of its bytes, and the 8 bytes with which a journal begins.
     name = os.fsencode(other_file)
     checksum = sum(struct.unpack(f"{len(name)}b", name)) % 2**32
     page = struct.pack(">I", 2**30 // 4096 + 1)
-    record = page + name + struct.pack(">II", len(name), checksum) + journal_bytes[:8]
-    journal.write_bytes(journal_bytes + record)
-    path.write_bytes(store_bytes)
+    record = page + name + struct.pack(">II", len(name), checksum) + content[:8]
+    journal.write_bytes(content + record)
     for read_only in (True, False):
         with pytest.raises(StoreError, match="journal"):
             ResultStore(tmp_path, read_only=read_only)
@@ -192,6 +191,8 @@ def test_a_journal_rolls_back_but_cannot_remove_other_files(tmp_path):
 def emptying_journal(path):
     """Make the journal of a transaction before which the store was empty: SQLite would empty it."""
     journal = path.with_name(f"{path.name}-journal")
+    # SQLite's journal header: its magic number; 0 records, a nonce, 0 pages of the database before
+    # the transaction, the bytes of a sector and of a page.
     head = bytes.fromhex("d9d505f920a163d7") + struct.pack(">5I", 0, 1, 0, 512, 4096)
     journal.write_bytes(head.ljust(512, b"\0"))
     return journal
@@ -216,18 +217,23 @@ def test_a_refused_store_leaves_no_connection_open(tmp_path, monkeypatch, read_o
 
 
 @pytest.mark.parametrize("read_only", [True, False])
-def test_reading_rolls_back_a_journal_but_refuses_a_stray_one(tmp_path, read_only):
+def test_a_journal_that_would_empty_a_store_is_refused(tmp_path, read_only):
     path = make_store(tmp_path)
-    expected, before = content_of(tmp_path), path.read_bytes()
-    journal = emptying_journal(path)
+    content = path.read_bytes()
+    emptying_journal(path)
     with pytest.raises(StoreError, match="move it away"):
         ResultStore(tmp_path, read_only=read_only)
-    assert path.read_bytes() == before
-    journal.unlink()
-    hot_journal(path)  # left by a process killed while it wrote
+    assert path.read_bytes() == content
+
+
+@pytest.mark.parametrize("read_only", [True, False])
+def test_reading_rolls_back_the_transaction_of_a_killed_process(tmp_path, read_only):
+    path = make_store(tmp_path)
+    expected = content_of(tmp_path)
+    journal = hot_journal(path)
     half_written = path.read_bytes()
     assert content_of(tmp_path, read_only=read_only) == expected
-    # Only a store that may be written is rolled back in its file; otherwise a copy is.
+    # A read-only store is copied, and the copy is rolled back; the files stay as they are.
     assert journal.exists() == read_only
     assert (path.read_bytes() == half_written) == read_only
 
@@ -260,8 +266,8 @@ def test_a_store_and_its_journals_must_be_regular_files(tmp_path, end, target_ty
 def test_a_stored_measurement_must_be_json(tmp_path):
     with ResultStore(tmp_path) as store:
         store.put("cost", "b", {})
-        kind, key, content = "cost", "b", "[" * 100_000
-        crc = zlib.crc32(repr((kind, key, content)).encode())
+        content = "[" * 100_000
+        crc = zlib.crc32(repr(("cost", "b", content)).encode())  # the store's checksum of a row
         execute_sql(store.path, f"UPDATE measurements SET content = '{content}', crc = {crc}")
         with pytest.raises(StoreError, match=r"results\.sqlite"):
             store.measurements("cost")
@@ -275,23 +281,24 @@ def test_files_of_a_run_replace_links_pipes_and_devices_and_keep_their_targets(
     folder, elsewhere = tmp_path / "run", tmp_path / "elsewhere"
     Run.create(folder, RUN)
     Run.open(folder).train()
-    (folder / "agent.safetensors").unlink()
-    names = ["agent.safetensors", "checkpoint.safetensors", "config.json", "curves.png",
-             "curves.csv", "results.md"]  # fmt: skip
     elsewhere.mkdir()
+    read_names = ("config.json", "checkpoint.safetensors")
+    written_names = ("agent.safetensors", "curves.png", "curves.csv", "results.md")
+    for name in read_names:
+        (folder / name).rename(elsewhere / name)
+    for name in written_names:
+        (folder / name).unlink(missing_ok=True)
+        (elsewhere / name).write_bytes(b"mine")
+    names = read_names + written_names
     for name in names:
-        target, path = elsewhere / name, folder / name
-        if path.exists():
-            path.rename(target)
-        else:
-            target.write_bytes(b"mine")
         if target_type == "pipe":
-            os.mkfifo(path)
+            os.mkfifo(folder / name)
         else:
-            path.symlink_to(target if target_type == "link" else "/dev/null")
+            target = elsewhere / name if target_type == "link" else "/dev/null"
+            (folder / name).symlink_to(target)
     contents = {name: (elsewhere / name).read_bytes() for name in names}
-    for name in ("config.json", "checkpoint.safetensors"):
-        if target_type != "link":  # a run is read from regular files only
+    if target_type != "link":  # a run is read from regular files, or links to them, only
+        for name in read_names:
             with pytest.raises((OSError, RunError), match=name):
                 Run.open(folder).train(steps=30)
             (folder / name).unlink()
@@ -324,7 +331,7 @@ def test_links_at_names_that_are_written_in_place_are_refused(tmp_path, name):
     assert list(other.iterdir()) == []
 
 
-TRUNCATED = """
+READ_WHILE_TRUNCATED = """
 import sys
 from pathlib import Path
 from sdnn.support import files
@@ -348,6 +355,6 @@ except ValueError as error:
 def test_a_file_truncated_while_it_is_read_is_reported_as_damaged(tmp_path):
     path = tmp_path / "file"
     write_file(path, "agent", {"a": np.zeros(2**20)}, {})
-    process = python("-c", TRUNCATED, path)
+    process = python("-c", READ_WHILE_TRUNCATED, path)
     assert process.returncode == 0, process.stderr
     assert f"{path} is damaged" in process.stdout

@@ -1,4 +1,4 @@
-"""Instruction sets of the processor: equal bits on each, and the selection of one."""
+"""Instruction sets of the processor: each gives the same bits; users can select one."""
 
 import pytest
 
@@ -9,6 +9,7 @@ from sdnn.support.machine import available_instruction_sets, instruction_set, se
 
 @pytest.fixture
 def restored_instruction_set():
+    """Select the present instruction set again after the test."""
     before = instruction_set()
     yield
     set_instruction_set(before)

@@ -45,9 +45,13 @@ def test_an_installation_with_bytecode_but_no_sources_works(tmp_path):
     compileall.compile_dir(tmp_path / "sdnn", quiet=1, legacy=True)
     for source in [*(tmp_path / "sdnn").rglob("*.py"), *(tmp_path / "sdnn").rglob("*.pyi")]:
         source.unlink()
-    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n"
-    code += "sys.meta_path[:] = sys.meta_path[-3:]  # not an editable installation's\n"
-    code += "import sdnn, sdnn.runs, sdnn.reproduction; assert sdnn.__file__.endswith('.pyc')\n"
-    code += "print(sdnn.runs.BudgetSpec().steps, sdnn.SDNNRegressor(), sdnn.SDNNKernelRidge())"
+    code = f"""
+import sys
+sys.path.insert(0, {str(tmp_path)!r})
+sys.meta_path[:] = sys.meta_path[-3:]  # Python's finders, without that of an editable install
+import sdnn, sdnn.runs, sdnn.reproduction
+assert sdnn.__file__.endswith('.pyc')
+print(sdnn.runs.BudgetSpec().steps, sdnn.SDNNRegressor(), sdnn.SDNNKernelRidge())
+"""
     process = python("-c", code)
     assert process.stdout == "None SDNNRegressor() SDNNKernelRidge()\n", process.stderr

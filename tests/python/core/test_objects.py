@@ -1,4 +1,8 @@
-"""Objects of the core: pickling, use by several threads at once, changed arrays, Ctrl-C."""
+"""Objects of the core: pickling, use by several threads at once, changed arrays, Ctrl-C.
+
+An object that works in one thread refuses other threads: the message has the word `IN_USE`. Sizes
+are chosen so that the work lasts longer than a test needs to try other uses.
+"""
 
 import pickle
 import re
@@ -36,19 +40,19 @@ def test_only_one_binding_header_releases_the_gil():
 
 @pytest.fixture
 def begin_in_thread():
-    """Begins to call a function in another thread; returns its future result."""
+    """Begins to call a function in another thread; returns the future of its result."""
     with ThreadPoolExecutor() as pool:
 
         def _begin(function):
             future = pool.submit(function)
-            time.sleep(0.02)
+            time.sleep(0.02)  # until the thread is at work in the core
             return future
 
         yield _begin
 
 
 def assert_refused(use, future):
-    """Check that a use is refused while another thread works, unless it has just ended."""
+    """Check that a use is refused while a thread works on ``future``, or that it has just ended."""
     try:
         use()
     except RuntimeError as error:
@@ -59,6 +63,7 @@ def assert_refused(use, future):
 
 
 def long_trial():
+    """Return a trial of 100,000 episodes, of which tests run a few."""
     settings = core_cells.GOOD["AcrobotTrial"]()
     settings["protocol"] = core.ProtocolConfig(episodes=100_000)
     return core.AcrobotTrial(**settings)
@@ -77,8 +82,8 @@ def test_a_trial_refuses_other_threads_while_it_advances(begin_in_thread):
         lambda: network.values([0.1] * 4),
         lambda: core.NetworkParts(network, 1),
     ]
-    refuses(IN_USE, uses[0], error=RuntimeError)
-    for use in uses:
+    refuses(IN_USE, uses[0], error=RuntimeError)  # the thread has only begun
+    for use in uses[1:]:
         assert_refused(use, advance)
     assert advance.result() is None
     assert trial.episode == 800
@@ -111,7 +116,7 @@ def test_a_layer_refuses_other_threads_while_it_is_trained(form, begin_in_thread
         lambda: layer.potentials(core_cells.BINS),
         lambda: core.PDeltaTrainer(layer, core_cells.BINS, [[1.0]] * 3),
     ]
-    refuses(IN_USE, uses[0], error=RuntimeError)
+    refuses(IN_USE, uses[0], error=RuntimeError)  # the thread has only begun
     order[:] = -(2**31)  # changes nothing: the trainer works on a copy
     for use in uses[1:]:
         assert_refused(use, training)
@@ -124,14 +129,14 @@ def test_a_layer_refuses_training_while_threads_read_it(begin_in_thread):
     trainer = new_trainer(layer, "plain", n_samples=5)
     bins = np.tile(np.array(core_cells.BINS, np.int32), (500_000, 1))
     expected = layer.counts(core_cells.BINS)
-    readings = [begin_in_thread(lambda: layer.counts(bins)) for _ in range(2)]
+    futures = [begin_in_thread(lambda: layer.counts(bins)) for _ in range(2)]
     refuses(IN_USE, trainer.present, [0], error=RuntimeError)
     bins[:] = 2**31 - 1  # changes nothing: the threads read a copy
     np.testing.assert_array_equal(layer.counts(core_cells.BINS), expected)
     assert layer.weights.shape == (4000, 40)
-    for reading in readings:
-        np.testing.assert_array_equal(reading.result()[-len(expected) :], expected)
-    trainer.present([0])
+    for future in futures:
+        np.testing.assert_array_equal(future.result()[-len(expected) :], expected)
+    trainer.present([0])  # is accepted now
 
 
 N_UNITS = 1000
@@ -209,9 +214,9 @@ def test_a_signal_ends_a_wait_for_readers_and_its_handler_may_read(begin_in_thre
 def test_a_batch_of_acrobots_refuses_other_threads_while_it_steps(begin_in_thread):
     n = 2**16
     batch = core.AcrobotBatch(core.AcrobotConfig(), n)
-    all_of_them = np.ones(n, np.bool_)
-    step = begin_in_thread(lambda: batch.step(np.ones(n), np.ones(n), all_of_them))
-    refuses(IN_USE, batch.reset, all_of_them, error=RuntimeError)
+    every_acrobot = np.ones(n, np.bool_)
+    step = begin_in_thread(lambda: batch.step(np.ones(n), np.ones(n), every_acrobot))
+    refuses(IN_USE, batch.reset, every_acrobot, error=RuntimeError)
     assert_refused(batch.states, step)
     assert len(step.result()) == 3, "rewards, terminated and truncated"
 
@@ -225,7 +230,7 @@ LONG_WORK = {
     "a trial of small steps": "trial_of_small_steps().advance(2)",
     "products": "b = np.zeros((30_000, 2), np.int32); core_cells.code().gram(b)",
 }
-"""Statements that run for longer than the test waits."""
+"""Statements that run longer than 3.5 s; ``c`` is the core, ``np`` NumPy."""
 
 
 @pytest.mark.parametrize("work", LONG_WORK)
@@ -249,13 +254,13 @@ else:
     command = [sys.executable, "-c", program]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout.readline() == "ready\n"
-        time.sleep(0.5)
+        time.sleep(0.5)  # until the core is at work
         begin = time.monotonic()
         process.send_signal(signal.SIGINT)
         assert process.stdout.readline() == "stopped\n"
         seconds = time.monotonic() - begin
     assert process.returncode == 0
-    assert seconds < 3.0  # the machine may be busy
+    assert seconds < 3.0  # it takes far less where the machine is not busy
 
 
 def test_a_trial_continues_after_ctrl_c_between_episodes():

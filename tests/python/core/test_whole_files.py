@@ -146,12 +146,19 @@ def test_csv_quotes_cells_with_commas():
     assert csv_bytes(("a", "b"), [(1, "x, y"), (2.5, "µ")]) == 'a,b\n1,"x, y"\n2.5,µ\n'.encode()
 
 
-def test_large_csv_tables_are_written_in_pieces_plain_or_compressed(tmp_path):
+def test_pieces_of_a_large_csv_table_are_the_whole_table():
     rows = [(number, "x" * 100) for number in range(30_000)]
     pieces = list(csv_pieces(("a", "b"), rows))
     assert len(pieces) > 2
     assert b"".join(pieces) == csv_bytes(("a", "b"), rows)
-    assert len(list(csv_pieces(("a",), []))) == 1
+
+
+def test_a_csv_table_without_rows_is_one_piece():
+    assert list(csv_pieces(("a",), [])) == [b"a\n"]
+
+
+def test_compressed_pieces_hold_the_content_and_have_the_same_bytes_again(tmp_path):
+    pieces = [b"a" * 100_000, b"b" * 100_000]
     path = tmp_path / "rows.csv.gz"
     write_whole(path, gzip_pieces(pieces))
     assert gzip.decompress(path.read_bytes()) == b"".join(pieces)
