@@ -1,4 +1,4 @@
-"""The page of the pole on a cart in Chromium: learning, controls and the hand."""
+"""The page of the pole on a cart in Chromium: learning, controls, and pushes by the visitor."""
 
 import re
 from pathlib import Path
@@ -9,7 +9,6 @@ from click.testing import CliRunner
 from sdnn.cli import main
 
 HEADERS = Path(__file__).parents[2] / "build" / "demonstration" / "headers"
-STATE = "text => document.getElementById('progress').textContent !== text"
 
 
 def test_the_agent_learns_to_balance(visit, controls):
@@ -24,13 +23,13 @@ def test_the_agent_learns_to_balance(visit, controls):
 
 
 @pytest.mark.parametrize(("copies", "memory"), [(1, "20 kB"), (2, "46 kB"), (3, "108 kB")])
-def test_copies_of_sensors_take_another_header(visit, controls, copies, memory):
+def test_the_number_of_sensors_selects_the_header_of_that_number(visit, controls, copies, memory):
     page = visit("balance.html")
     page.locator("#run:enabled").wait_for()
     controls.slide(page, "copies", copies)
     assert page.locator("#memory").inner_text() == memory
     command = page.locator("#command").text_content()
-    assert command.count("--range") == 4 * copies
+    assert command.count("--range") == 4 * copies, "four sensors, each so often"
 
 
 def test_the_command_writes_the_header_that_runs_here(visit, controls, tmp_path, monkeypatch):
@@ -50,19 +49,16 @@ def test_keyboard_alone_reaches_every_control_and_pushes_the_cart(visit):
     page = visit("balance.html", reduced_motion="reduce")
     page.locator("#run:enabled").wait_for()
     page.locator("nav a").last.focus()
-    reached = []
-    for _ in range(7):
+    for control in ("run", "restart", "push-left", "push-right", "speed", "noise", "copies"):
         page.keyboard.press("Tab")
-        reached.append(page.evaluate("document.activeElement.id"))
-    names = ["run", "restart", "push-left", "push-right", "speed", "noise", "copies"]
-    assert reached == names
+        assert page.evaluate("document.activeElement.id") == control
     page.locator("#noise").focus()
     page.keyboard.press("End")
     assert page.locator("#noise-text").inner_text() == "10.0 %"
     page.locator("#push-right").focus()
     before = page.locator("#picture").screenshot()
     page.keyboard.down("Space")
-    page.wait_for_timeout(1200)  # stills come once a second
+    page.wait_for_timeout(1200)  # ms; with reduced motion the picture changes once a second
     pushed = page.locator("#picture").screenshot()
     page.keyboard.up("Space")
     page.wait_for_timeout(1200)
@@ -75,10 +71,12 @@ def test_a_press_beside_the_cart_pushes_it(visit, controls):
     page.locator("#run:enabled").wait_for()
     controls.slide(page, "speed", 0)
     page.locator("#restart").click()
-    box = page.locator("#picture").bounding_box()
+    picture = page.locator("#picture").bounding_box()
     before = page.locator("#progress").inner_text()
-    page.mouse.move(box["x"] + 10, box["y"] + box["height"] / 2)
+    page.mouse.move(picture["x"] + 10, picture["y"] + picture["height"] / 2)
     page.mouse.down()
-    page.wait_for_function(STATE, arg=before)
+    page.wait_for_function(
+        "before => document.getElementById('progress').textContent !== before", arg=before
+    )
     page.mouse.up()
     assert page.locator("#error").is_hidden()

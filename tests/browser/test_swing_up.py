@@ -8,18 +8,22 @@ from click.testing import CliRunner
 
 from sdnn.cli import main
 
-FINISH = 120_000  # ms
+FINISH_MS = 120_000
+"""Limit of the time in which both agents learn 1,000 episodes."""
 
 
 def finish(page, controls, *, sensors, noise=0.02, seed=0, preset="robust"):
-    """Let both agents learn 1,000 episodes; return the digest and the command that are shown."""
+    """Let both agents learn 1,000 episodes with settings of the controls.
+
+    Returns the digest of the rows and the command of `sdnn` that the page shows at the end.
+    """
     page.locator("#preset").select_option(preset)
     controls.slide(page, "sensors", sensors)
     controls.slide(page, "noise", noise)
     page.locator("#seed").fill(str(seed))
     page.locator("#seed").press("Tab")
     controls.speed_up(page)
-    page.locator("#result").wait_for(timeout=FINISH)
+    page.locator("#result").wait_for(timeout=FINISH_MS)
     return page.locator("#digest").inner_text(), page.locator("#command").inner_text()
 
 
@@ -55,23 +59,23 @@ def test_other_noise_and_the_settings_of_the_paper_have_native_digests(
 def test_speed_does_not_change_the_rows(visit, controls):
     page = visit("index.html")
     controls.slide(page, "speed", 3)
-    page.wait_for_timeout(1500)  # some decisions in time with the clock, and an episode under way
+    page.wait_for_timeout(1500)  # ms, in which the agents begin at this speed
     controls.speed_up(page)
-    page.locator("#result").wait_for(timeout=FINISH)
-    slow = page.locator("#digest").inner_text()
+    page.locator("#result").wait_for(timeout=FINISH_MS)
+    digest_of_both_speeds = page.locator("#digest").inner_text()
     page.locator("#restart").click()
     assert page.locator("#result").is_hidden()
-    page.locator("#result").wait_for(timeout=FINISH)
-    assert page.locator("#digest").inner_text() == slow
+    page.locator("#result").wait_for(timeout=FINISH_MS)
+    assert page.locator("#digest").inner_text() == digest_of_both_speeds
 
 
 def test_curves_and_summary_follow_the_trials(visit, controls):
     page = visit("index.html")
     finish(page, controls, sensors=6)
     summary = page.locator("#summary").inner_text()
-    counts = re.findall(r"(\d+) of (\d+) tests", summary)
-    assert [int(total) for _, total in counts] == [100, 100]
-    assert int(counts[0][0]) > int(counts[1][0]), "SDNN-C keeps the swing-up, fuzzy Q-learning not"
+    sdnn_c, fuzzy = re.findall(r"(\d+) of (\d+) tests", summary)
+    assert (sdnn_c[1], fuzzy[1]) == ("100", "100"), "a test after each 10 of 1,000 episodes"
+    assert int(sdnn_c[0]) > int(fuzzy[0]), "SDNN-C keeps the swing-up, fuzzy Q-learning does not"
     colors = page.locator("#chart").evaluate(
         """canvas => new Set(new Uint32Array(canvas.getContext("2d").getImageData(
            0, 0, canvas.width, canvas.height).data.buffer)).size"""
@@ -83,11 +87,9 @@ def test_keyboard_alone_reaches_and_uses_every_control(visit):
     page = visit("index.html")
     page.locator("#restart:enabled").wait_for()
     page.locator("nav a").last.focus()
-    reached = []
-    for _ in range(7):
+    for control in ("run", "restart", "speed", "noise", "sensors", "preset", "seed"):
         page.keyboard.press("Tab")
-        reached.append(page.evaluate("document.activeElement.id"))
-    assert reached == ["run", "restart", "speed", "noise", "sensors", "preset", "seed"]
+        assert page.evaluate("document.activeElement.id") == control
     page.locator("#noise").focus()
     page.keyboard.press("ArrowRight")
     assert page.locator("#noise-text").inner_text() == "0.025"
@@ -97,13 +99,14 @@ def test_keyboard_alone_reaches_and_uses_every_control(visit):
     page.locator("#speed").focus()
     page.keyboard.press("End")
     assert page.locator("#speed-text").inner_text() == "fastest"
-    page.locator("#result").wait_for(timeout=FINISH)
+    page.locator("#result").wait_for(timeout=FINISH_MS)
     assert "--sensors 4 --noise 0.025" in page.locator("#command").inner_text()
 
 
 def test_pause_stops_and_start_continues(visit):
     page = visit("index.html")
     run, progress = page.locator("#run"), page.locator("#progress-0")
+    # The text is such as "episode 1, 3 s": wait for the first episode or decision.
     page.wait_for_function("document.getElementById('progress-0').textContent.includes('1')")
     run.focus()
     page.keyboard.press("Space")
@@ -125,7 +128,7 @@ def test_an_invalid_seed_changes_nothing(visit, controls):
     page.locator("#seed").press("Tab")
     assert page.locator("#seed").evaluate("input => input.validity.rangeUnderflow")
     controls.speed_up(page)
-    page.locator("#result").wait_for(timeout=FINISH)
+    page.locator("#result").wait_for(timeout=FINISH_MS)
     assert page.locator("#command").inner_text().endswith("--seed 0")
 
 

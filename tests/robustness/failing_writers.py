@@ -1,6 +1,6 @@
 """Writes files while one call after the other fails; run by test_faults.py under faults.c.
 
-``python failing_writers.py ACTION FOLDER ERROR...`` prints how many calls were made to fail.
+``python failing_writers.py ACTION FOLDER ERRNO...`` prints how many calls were made to fail.
 """
 
 import ctypes
@@ -22,50 +22,55 @@ ROWS = [
 KEY = make_record(9).key
 
 
-def write(folder, number):
-    write_file(folder / "file", "agent", {"a": np.full(10_000, number)}, {"number": number})
+def write_agent(folder, version):
+    write_file(folder / "file", "agent", {"a": np.full(10_000, version)}, {"version": version})
 
 
-def content(folder):
+def read_agent(folder):
     description, arrays = read_file(folder / "file", "agent")
-    assert (arrays["a"] == description["number"]).all()
-    return description["number"]
+    assert (arrays["a"] == description["version"]).all()
+    return description["version"]
 
 
-def add(folder, number):
+def add_trial(folder, version):
     with ResultStore(folder) as store:
-        store.add(make_record(number, steps=range(1, 300)))
+        store.add(make_record(version, steps=range(1, 300)))
 
 
-def extend(folder, number):
+def extend_run(folder, version):
     with ResultStore(folder) as store:
-        rows = TrialRows.from_training(ROWS[: 100 * number], 0)
+        rows = TrialRows.from_training(ROWS[: 100 * version], 0)
         store.extend(KEY, rows, 0, config="{}", version="0.1")
 
 
-def stored(folder):
+def read_store(folder):
     with ResultStore(folder) as store:
         return len(store.load()), len(store.rows(KEY).table)
 
 
 ACTIONS = {
-    "file": (write, content, OSError),
-    "finished trial": (add, stored, StoreError),
-    "run in progress": (extend, stored, StoreError),
+    "file": (write_agent, read_agent, OSError),
+    "finished trial": (add_trial, read_store, StoreError),
+    "run in progress": (extend_run, read_store, StoreError),
 }
+"""How to write version 1 or 2 to a folder, how to read it, and the error of failed writes."""
 
 
-def n_faults(action, folder, error_number):
-    """Let every call fail in turn; give their number."""
-    act, look, kind = ACTIONS[action]
-    faults = ctypes.CDLL(None)
+def count_faults(action, folder, error_number):
+    """Write version 2 over version 1 while call 1, 2, ... fails; return the number of calls.
+
+    Checks after each that the folder has either version, and no other files; and that an error
+    names the folder.
+    """
+    write, read, error_type = ACTIONS[action]
+    faults = ctypes.CDLL(None)  # the functions of faults.c, which is preloaded
     before, work = folder / "before", folder / "work"
     before.mkdir()
-    act(before, 1)
-    names, old = sorted(p.name for p in before.iterdir()), look(before)
+    write(before, 1)
+    names, old = sorted(path.name for path in before.iterdir()), read(before)
     shutil.copytree(before, work)
-    act(work, 2)
-    new = look(work)
+    write(work, 2)
+    new = read(work)
     assert old != new
     for number in itertools.count(1):
         shutil.rmtree(work)
@@ -73,18 +78,19 @@ def n_faults(action, folder, error_number):
         error = None
         faults.fault_arm(str(work).encode(), ctypes.c_long(number), error_number)
         try:
-            act(work, 2)
-        except kind as caught:
+            write(work, 2)
+        except error_type as caught:
             error = caught
         n_calls = faults.fault_disarm()
-        where = f"{action}, call {number}: {error!r}"
-        content = look(work)
-        assert content in ((old, new) if error else (new,)), where
-        assert error is None or str(work) in str(error), where
-        assert sorted(p.name for p in work.iterdir()) == names, where
-        if n_calls < number:
+        case = f"{action}, call {number}: {error!r}"
+        assert read(work) in ((old, new) if error else (new,)), case
+        assert error is None or str(work) in str(error), case
+        assert sorted(path.name for path in work.iterdir()) == names, case
+        if n_calls < number:  # all calls have failed in their turn, and this time none did
             return number - 1
 
 
 if __name__ == "__main__":
-    print(sum(n_faults(sys.argv[1], Path(sys.argv[2]) / str(e), e) for e in map(int, sys.argv[3:])))
+    action, folder, *error_numbers = sys.argv[1:]
+    numbers = [count_faults(action, Path(folder, e), int(e)) for e in error_numbers]
+    print(sum(numbers))

@@ -1,5 +1,6 @@
-/* Makes one call fail: of the system, about a file in a folder, or, with the error ENOMEM, an
-   allocation by SQLite or C++. Preloaded by test_faults.py. */
+/* Makes one call fail: a system call about a file in a folder or, with the error ENOMEM, an
+   allocation by SQLite or by libstdc++. Preloaded by test_faults.py, so that its functions replace
+   those of the C library and call them. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -13,42 +14,45 @@
 
 #define MOST_FILES 65536
 static char folder[PATH_MAX];
-static char is_ours[MOST_FILES];
-static long n_calls, failing;
+static char is_ours[MOST_FILES]; /* whether a file descriptor is of a file in the folder */
+static long n_calls, failing_call;
 static int error_number, is_armed;
 
-/* Let the call of this number, from 1, fail with an error. */
+/* Lets the call with this number, counted from 1, fail with an error of errno.h. */
 void fault_arm(const char* path, long number, int error) {
   strncpy(folder, path, sizeof folder - 1);
   memset(is_ours, 0, sizeof is_ours);
   n_calls = 0;
-  failing = number;
+  failing_call = number;
   error_number = error;
   is_armed = 1;
 }
 
-/* Return how many calls there were. */
+/* Returns how many calls were counted since fault_arm. */
 long fault_disarm(void) {
   is_armed = 0;
   return n_calls;
 }
 
+/* For programs that do not call fault_arm: runs before their main. */
 __attribute__((constructor)) static void arm_by_environment(void) {
   const char* number = getenv("FAULT_NUMBER");
   if (number) fault_arm(getenv("FAULT_FOLDER"), atol(number), atoi(getenv("FAULT_ERROR")));
 }
 
+/* Counts a system call; returns whether it is the one to fail. */
 static int fails(void) {
-  if (!is_armed || error_number == ENOMEM || ++n_calls != failing) return 0;
+  if (!is_armed || error_number == ENOMEM || ++n_calls != failing_call) return 0;
   errno = error_number;
   return 1;
 }
 
+/* Counts an allocation if its caller is in SQLite or libstdc++; returns whether it is to fail. */
 static int fails_to_allocate(void* caller) {
   Dl_info about;
   if (!is_armed || error_number != ENOMEM || !dladdr(caller, &about) || !about.dli_fname) return 0;
   if (!strstr(about.dli_fname, "sqlite3") && !strstr(about.dli_fname, "libstdc++")) return 0;
-  if (++n_calls != failing) return 0;
+  if (++n_calls != failing_call) return 0;
   errno = ENOMEM;
   return 1;
 }
@@ -70,6 +74,7 @@ static int is_inside(const char* path) {
 
 static int is_open(int file) { return is_armed && file >= 0 && file < MOST_FILES && is_ours[file]; }
 
+/* Notes whether a file that was opened is in the folder; returns its descriptor. */
 static int noted(int file, const char* path) {
   if (file >= 0 && file < MOST_FILES) is_ours[file] = (char)is_inside(path);
   return file;
@@ -102,7 +107,7 @@ ON_FILE(int, ftruncate64, (int file, off64_t size), (file, size))
 ON_FILE(int, fsync, (int file), (file))
 ON_FILE(int, fdatasync, (int file), (file))
 
-int close(int file) { /* which closes also where it fails */
+int close(int file) { /* closes the file also where it fails, as Linux does */
   const int was_open = is_open(file);
   if (file >= 0 && file < MOST_FILES) is_ours[file] = 0;
   const int result = REAL(int (*)(int), "close")(file);

@@ -4,10 +4,10 @@
     python tests/robustness/kill_and_resume.py --kills 50 -- sweep STUDY.toml
 
 The instants are spread over the whole command: start, trials, costs, figures and files. A round
-runs the command in one folder, stopping it again and again by one of `WAYS`, until it ends by
-itself; then a new folder is begun, until there were enough kills. At the end of every round the
-folder must hold the rows, files and nothing else that an uninterrupted run leaves. Times of costs
-are no rows: only their keys count.
+runs the command in one folder and stops it again and again by one of `WAYS`, until a run succeeds.
+Rounds follow, each in a new folder, until there were enough kills. At the end of every round the
+folder must hold the rows and files that an uninterrupted run leaves, and nothing else. Measured
+times of costs differ between runs: only the keys of costs are compared.
 """
 
 from __future__ import annotations
@@ -38,50 +38,54 @@ WAYS = {
     "STOP, CONT": (signal.SIGSTOP, signal.SIGCONT),
     "STOP, KILL": (signal.SIGSTOP, signal.SIGKILL),
 }
-"""Signals, one after the other."""
+"""Signals that are sent one after the other, by the names of the ways to stop a command."""
 
 END_SECONDS = 60.0
-"""In which a command that was asked to end must have ended."""
+"""Time within which a command must end after the signals."""
 
-ENDINGS = {0, 130, 143, *(-number for number in (1, 2, 9, 15))}
-"""Done, interrupted, terminated, or ended by a signal that nobody handles."""
+HANDLED_SIGNALS = {128 + signal.SIGINT, 128 + signal.SIGTERM}
+FATAL_SIGNALS = {-signal.SIGHUP, -signal.SIGINT, -signal.SIGKILL, -signal.SIGTERM}
+EXIT_CODES = {0} | HANDLED_SIGNALS | FATAL_SIGNALS
+"""Exit codes of stopped commands: done; ended in order after a signal; ended by the signal."""
 
 CRASHES = ("terminate called", "Fatal Python error", "FATAL:", "core dumped")
 
 
 def content(folder: Path) -> dict[str, object]:
-    """Results that must not depend on kills: rows, keys of costs, and names of files."""
-    kept: dict[str, object] = {"files": sorted(path.name for path in folder.iterdir())}
+    """Return the results that must not depend on kills: rows, keys of costs, names of files."""
+    results: dict[str, object] = {"files": sorted(path.name for path in folder.iterdir())}
     for path in folder.glob("results*.csv"):
-        kept["rows"] = path.read_bytes()
+        results["rows"] = path.read_bytes()
     for path in folder.glob("*results.csv.gz"):  # of a sweep
-        kept["rows"] = gzip.decompress(path.read_bytes())
+        results["rows"] = gzip.decompress(path.read_bytes())
     for path in folder.glob("*table*.json"):
         table = json.loads(path.read_text())
-        kept["digest"] = table["digest"]
-        kept["costs"] = [(cost["series"], cost["n_inputs"]) for cost in table.get("costs", [])]
-    return kept
+        results["digest"] = table["digest"]
+        results["costs"] = [(cost["series"], cost["n_inputs"]) for cost in table.get("costs", [])]
+    return results
 
 
 def run(
     folder: Path, arguments: list[str], seconds: float | None = None, way: str = "KILL"
 ) -> bool:
-    """Run the command; stop it after `seconds`. Returns whether it ended by itself.
+    """Run the command, and stop it after `seconds` (None: never) by a way of `WAYS`.
+
+    Returns whether it succeeded: by itself, or in spite of the signals.
 
     Raises
     ------
     RuntimeError
-        If it fails, crashes, or goes on after it was asked to end.
+        If it fails, crashes, or still runs `END_SECONDS` after the signals.
     """
     process = subprocess.Popen(
         [*PROGRAM, *arguments, "--out", str(folder)],
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True,
     )  # fmt: skip
-    told = "it was left alone"
+    signals, allowed_codes = "without a signal", {0}
     try:
         output, _ = process.communicate(timeout=seconds)
     except subprocess.TimeoutExpired:
-        told = f"{way} after {seconds:.2f} s"
+        signals, allowed_codes = f"{way} after {seconds:.2f} s", EXIT_CODES
         for number in WAYS[way]:
             os.killpg(process.pid, number)
             time.sleep(0.05)
@@ -90,22 +94,21 @@ def run(
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             output, _ = process.communicate()
-            raise RuntimeError(f"{told}: it went on\n{output}") from None
-    is_whole = process.returncode == 0
-    allowed = {0} if seconds is None or told.startswith("it") else ENDINGS
-    if process.returncode not in allowed or any(crash in output for crash in CRASHES):
-        raise RuntimeError(f"{told}: it ended with {process.returncode}\n{output}")
-    return is_whole
+            raise RuntimeError(f"{signals}: it did not end\n{output}") from None
+    if process.returncode not in allowed_codes or any(crash in output for crash in CRASHES):
+        raise RuntimeError(f"{signals}: it ended with {process.returncode}\n{output}")
+    return process.returncode == 0
 
 
-def ended(
-    folder: Path, arguments: list[str], limit: tuple[int, int]
+def run_with_small_files(
+    folder: Path, arguments: list[str], max_bytes: int
 ) -> subprocess.CompletedProcess[str]:
-    """Run the command to its end under a limit (resource, most), whatever comes of it."""
+    """Run the command where no file can be larger, as on a full disk; return what it did."""
 
     def restrict() -> None:
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # writing fails then, as on a full disk
-        resource.setrlimit(limit[0], (limit[1], limit[1]))
+        # Without its handler a write beyond the limit ends the process instead of failing.
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (max_bytes, max_bytes))
 
     return subprocess.run(
         [*PROGRAM, *arguments, "--out", str(folder)],
@@ -115,14 +118,14 @@ def ended(
 
 
 def kill_and_resume(arguments: list[str], n_kills: int, seed: int) -> str:
-    """Stop the command `n_kills` times at least; returns a line about it.
+    """Stop the command at least `n_kills` times; return a line that reports the kills.
 
     Raises
     ------
     AssertionError
         If a resumed run differs from an uninterrupted one.
     RuntimeError
-        As of `run`.
+        If a run fails or does not end: see `run`.
     """
     instants = random.Random(seed)
     killed: collections.Counter[str] = collections.Counter()
@@ -141,11 +144,11 @@ def kill_and_resume(arguments: list[str], n_kills: int, seed: int) -> str:
                 killed[way] += 1
                 way = instants.choice(list(WAYS))
                 print(f"\rkilled {killed.total()} times", end="", file=sys.stderr, flush=True)
-            found = content(folder)
+            results = content(folder)
             for name, value in expected.items():
-                assert found[name] == value, (
-                    f"{name} of {folder.name} differ after kills: {found[name]!r:.2000} instead of"
-                    f" {value!r:.2000}"
+                assert results[name] == value, (
+                    f"{name} of {folder.name} differ after kills: {results[name]!r:.2000} instead"
+                    f" of {value!r:.2000}"
                 )
     print(file=sys.stderr)
     ways = ", ".join(f"{way} {number}" for way, number in sorted(killed.items()))
@@ -156,10 +159,10 @@ def kill_and_resume(arguments: list[str], n_kills: int, seed: int) -> str:
 
 
 def main() -> None:
-    """Read the options."""
+    """Kill and resume the command of the options."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--kills", type=int, default=50)
-    parser.add_argument("--seed", type=int, default=0, help="of the instants")
+    parser.add_argument("--seed", type=int, default=0, help="of the random instants")
     parser.add_argument("arguments", nargs="*", default=["reproduce", "all", "--quick"])
     options = parser.parse_args()
     print(kill_and_resume(options.arguments, options.kills, options.seed))

@@ -1,6 +1,8 @@
 """Let agents learn in random spaces with random settings: python tests/robustness/soak.py.
 
-``nox -s soak-weekly`` runs it under sanitizers; ``--first NUMBER --lives 1`` repeats a life.
+A life is an agent with its space and settings, all drawn by the number of the life (see
+random_lives.py). ``--first NUMBER --lives 1`` repeats a life. ``nox -s soak-weekly`` runs lives
+under sanitizers.
 """
 
 import argparse

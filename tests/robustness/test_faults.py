@@ -52,6 +52,7 @@ def faults(tmp_path_factory):
 
 @pytest.mark.parametrize(
     ("action", "errors", "n_least"),
+    # The least numbers of failed calls are chosen a little below those that were counted.
     [
         ("file", SYSTEM, 20),
         ("finished trial", SYSTEM, 100),
@@ -64,7 +65,7 @@ def test_a_python_writer_leaves_the_old_or_new_file_at_every_failing_call(
     faults, tmp_path, action, errors, n_least
 ):
     for error in errors:
-        (tmp_path / str(error)).mkdir()
+        (tmp_path / str(error)).mkdir()  # one folder for each error
     path = os.pathsep.join([*(p for p in sys.path if p), str(ROOT / "tests/python/reference")])
     process = subprocess.run(
         [sys.executable, HERE / "failing_writers.py", action, tmp_path, *map(str, errors)],
@@ -83,7 +84,7 @@ def test_the_cpp_writer_leaves_the_old_or_new_file_at_every_failing_call(faults,
     compiled("c++", "-std=c++20", f"-I{ROOT / 'cpp/include'}", source, "-o", program)
     folder.mkdir()
     path, new, n_failed = folder / "file", b"n" * 200_000, 0
-    for number in range(1, 20):
+    for number in range(1, 20):  # the call that fails, if there are so many
         path.write_bytes(b"old")
         faulty = {
             "LD_PRELOAD": faults,
