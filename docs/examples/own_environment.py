@@ -68,7 +68,7 @@ for name, controller in controllers.items():
     print(f"{name}: return {evaluation.mean_return:.2f}, {evaluation.lengths.mean():.1f} steps")
 
 # %% [markdown]
-# A perfect landing gives 1 less 0.02 for each step. The rule is carried away by the current in the
+# A perfect landing gives 1 minus 0.02 for each step. The rule is carried away by the current in the
 # middle and has to fight its way back; the agent has learned to steer against the current before.
 
 

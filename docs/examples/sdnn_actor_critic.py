@@ -41,12 +41,14 @@ class CodeWithThermometers(SDNNCode):
 
     def __init__(self, n_inputs, s):
         super().__init__(n_inputs, s)
+        # The pairs of an input have n_active features that are not 0. A thermometer has at most
+        # half as many units, in words of 64, but at least 64.
         n_active = s.n_pattern_units * (n_inputs - 1) // 4
         self.n_units = 64 * max(1, n_active // 128)
         self.n_columns += n_inputs * self.n_units
 
     def __call__(self, state):
-        last = len(self.books[0]) - 1
+        last = len(self.books[0]) - 1  # bin of the largest inputs
         bins = np.minimum((np.array(state) * (last + 1)).astype(int), last)
         n_above = (2 * bins * self.n_units + last) // (2 * last)
         thermometers = np.where(np.arange(self.n_units) < n_above[:, None], 1, -1)
@@ -54,7 +56,10 @@ class CodeWithThermometers(SDNNCode):
 
 
 def power_of_half(x):
-    """2^-x in units of 2^-30, by a polynomial; x in units of 2^-20."""
+    """Return 2^-x in units of 2^-30, to 5e-6; x in units of 2^-20.
+
+    The coefficients are those of a polynomial for 2^-f, f in [0, 1), that is exact at both ends.
+    """
     power = 0
     for coefficient in (7356191, -57204762, 257158220, -744180561, 1 << 30):
         power = coefficient + rounded(power * (x % 2**20), 20)
@@ -62,7 +67,10 @@ def power_of_half(x):
 
 
 def log2_of(x):
-    """log2(x / 2^30) in units of 2^-20, by a polynomial."""
+    """Return log2(x / 2^30) in units of 2^-20, to 1e-4; x is at least 1.
+
+    The coefficients are those of a polynomial for log2(1 + f), f in [0, 1), exact at both ends.
+    """
     exponent = int(x).bit_length() - 1
     fraction = ((x << 30 >> exponent) - 2**30) >> 10
     logarithm = 0
@@ -72,12 +80,16 @@ def log2_of(x):
 
 
 class ErrorScale:
-    """(2) TD errors in units of their root mean square, clipped at 3, with 12 fractional bits."""
+    """(2) TD errors in units of their root mean square, clipped at 3, with 12 fractional bits.
+
+    The mean counts the last 1,024 errors most. Errors and their scale have the critic's unit.
+    """
 
     def __init__(self):
         self.mean_square, self.n_errors, self.exponent = 0, 0, 0
 
     def normalized(self, error, exponent):
+        """Add an error in units of 2^exponent to the mean; return it divided by the root."""
         n_doubled = exponent - self.exponent
         self.mean_square = min(rounded_down(self.mean_square, 2 * n_doubled), 2**60)
         self.exponent = exponent
@@ -89,10 +101,12 @@ class ErrorScale:
 
 
 def rounded_down(x, n_bits):
+    """Return x / 2^n_bits, rounded down; n_bits may be negative."""
     return x >> n_bits if n_bits >= 0 else x << -n_bits
 
 
 def quotient(x, n):
+    """Return x / n, rounded towards 0."""
     return abs(x) // n * (1 if x >= 0 else -1)
 
 
@@ -115,8 +129,13 @@ class ActorCritic:
         self.trace[:], self.next_state = 0, None
 
     def terms(self, x):
-        """Return weights exp(h - max h), probabilities and their logarithms, for each dimension."""
+        """Yield for each dimension: weights exp(h - max h), probabilities and their logarithms.
+
+        Units are 2^-30, 2^-16 and, to the base 2, 2^-20.
+        """
         for preferences in np.split(self.weights @ x, self.first_rows[1:-1]):
+            # exp(h - max h) is 2^-bits. Numbers are in units of 2^-20, and log2(e) is 1549082005 in
+            # units of 2^-30. Actions of 40 bits have no weight.
             below = (preferences.max() - preferences) >> (self.unit_bits - 20)
             bits = np.minimum(rounded(np.minimum(below, 40 << 20) * 1549082005, 30), 40 << 20)
             weights = [int(power_of_half(int(b))) for b in bits]
@@ -171,7 +190,7 @@ class ActorCritic:
                 gain = 2**12 * (a == action[d]) - rounded(p, 4)
                 self.trace[self.first_rows[d] + a] += gain * x
                 # (5) A step along the gradient of the policy's entropy keeps it random.
-                nats = rounded((entropy + logarithms[a]) * 45426, 16)
+                nats = rounded((entropy + logarithms[a]) * 45426, 16)  # ln(2), times 2^16
                 slopes.append(rounded(p * nats, 20))
         self.trace = clipped(self.trace, 17)
         self.weights += rounded(rounded(step, n_bits) * self.trace, 12 - n_bits)

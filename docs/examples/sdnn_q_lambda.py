@@ -6,6 +6,9 @@ It is true online TD(lambda) (van Seijen et al. 2016, algorithm 2) with the cut 
 Q(lambda) (1989). Numbered comments mark the differences. The library learns the same weights, bit
 for bit, and faster; a test compares them. Two things are not on this page: the warm-up that fits
 ranges and selects inputs, and what the library does if the size of rewards changes by far.
+
+Numbers are integers in units of 2^-b: a product of one with b and one with c such bits has b + c,
+and ``rounded(product, c)`` has b again. Limits such as 2^33 keep all products within 64 bits.
 """
 
 import argparse
@@ -45,6 +48,7 @@ def rounded(x, n_bits):
 
 
 def clipped(x, n_bits):
+    """Return x within the numbers of n_bits bits and a sign."""
     return np.clip(x, 1 - 2**n_bits, 2**n_bits - 1)
 
 
@@ -57,6 +61,8 @@ class SDNNCode:
 
     def __init__(self, n_inputs, s):
         n_groups = n_inputs * (n_inputs - 1)
+        # Units of a pattern, in words of 64: as many as make about 3,072 features in all groups; or
+        # 256, which keep chance correlations small, while these make at most 14,336 features.
         n_units = max((3072 // n_groups + 32) // 64 * 64, min(256, 14336 // n_groups // 64 * 64))
         s.n_pattern_units = min(max(n_units, 64), 768)
         self.books = [code_book(s, Random(s.seed, CODE_BOOKS, mu)) for mu in range(n_inputs)]
@@ -98,8 +104,8 @@ class QLambda:
         # (4) All numbers are integers. Weights and values count units of 2^exponent, traces units
         #     of 2^-12. The first reward sets the exponent.
         self.exponent = None
-        self.n_learned = self.n_corrections = self.n_snapshots = 0
-        self.n_terminated = self.n_random_left = 0
+        self.n_learned = self.n_corrections = self.n_snapshots = self.n_terminated = 0
+        self.n_random_left = 0  # steps of the search that (6) describes
         self.ties, self.greedy_ties, self.exploration, self.repetitions = (
             Random(s.seed, stream) for stream in (TIES, GREEDY_TIES, EXPLORATION, REPETITIONS)
         )
@@ -107,12 +113,15 @@ class QLambda:
 
     def begin_episode(self):
         self.end_trace()
-        self.n_kept, self.n_steps, self.is_excursion, self.skips_learning = 0, 0, False, False
+        self.n_steps = 0
+        self.n_kept = 0  # steps for which the present action is still kept
+        self.is_excursion = self.skips_learning = False
 
     def end_trace(self):
         self.trace[:], self.old_value, self.next_state = 0, 0, None
 
     def rows(self, action):
+        """Return the row of weights of each dimension's part of an action."""
         return self.first_rows[:-1] + action
 
     def sums(self, x, weights):
@@ -126,7 +135,10 @@ class QLambda:
         return int(sum(part.max() for part in self.sums(x, self.weights)))
 
     def scheduled(self, first, last):
-        """(5) Half of the way from first to last after schedule_steps, in steps of 2^-16."""
+        """(5) Return a rate times 2^16: half of the way from first to last after schedule_steps.
+
+        After n steps it is first + (last - first) n / (n + schedule_steps), rounded.
+        """
         first, last = round(first * 2**16), round(last * 2**16)
         end = self.n_learned + self.settings.schedule_steps
         return first + (2 * (last - first) * self.n_learned + end) // (2 * end)
@@ -139,43 +151,50 @@ class QLambda:
         return has_only_zeros and self.settings.max_action_repeat > 1 and self.epsilon() > 0
 
     def act(self, state, explore=True):
-        s = self.settings
-        if explore:
-            # (6) While all rewards were 0, values have no order: the agent searches by random
-            #     actions that last, and for twice as many steps after the first reward, too.
-            must_explore = self.n_random_left > 0 or self.lacks_rewards()
-            self.n_random_left = max(self.n_random_left - 1, 0)
-            self.n_steps += 1
-            if self.is_excursion and (self.n_kept == 0 or self.epsilon() == 0):
-                self.n_kept, self.is_excursion = 0, False
-            self.skips_learning = self.is_excursion
-            if self.n_kept > 0:
-                self.n_kept -= 1
-                return self.worst(state) if self.is_excursion else self.kept_action
-            if must_explore or self.exploration.uniform() < self.epsilon():
-                # (7) A random action is kept for at least k steps with probability 1 / k. Each
-                #     episode that terminates halves the longest duration, down to 5 steps.
-                longest = max(s.max_action_repeat >> self.n_terminated, min(5, s.max_action_repeat))
-                # (8) In endless episodes a fourth of these draws begins an excursion from good
-                #     states: its steps take the worst action, and are not learned.
-                is_long = self.n_steps > 2000 and s.max_action_repeat > 1 and not must_explore
-                self.is_excursion = is_long and self.repetitions.below(4) == 0
-                self.skips_learning = self.is_excursion
-                if self.is_excursion:
-                    self.n_kept = self.repetitions.below(longest)
-                    return self.worst(state)
-                n_actions = np.diff(self.first_rows)
-                self.kept_action = [self.exploration.below(int(n)) for n in n_actions]
-                if must_explore:
-                    self.n_kept = self.repetitions.below(s.max_action_repeat // 2)
-                else:
-                    self.n_kept = int(min(1 / (1 - self.repetitions.uniform()), longest)) - 1
-                return self.kept_action
+        """Return an index for each dimension: the best action or, if exploring, another one."""
+        action = self.exploratory_action(state) if explore else None
+        if action is not None:
+            return action
         # (9) Without exploration, actions follow an average of the weights.
         weights = self.average if not explore and self.n_snapshots > 0 else self.weights
         ties = self.ties if explore else self.greedy_ties
         best = [np.flatnonzero(part == part.max()) for part in self.sums(self.code(state), weights)]
         return [int(tied[ties.below(len(tied)) if len(tied) > 1 else 0]) for tied in best]
+
+    def exploratory_action(self, state):
+        """Return a random, kept or worst action; None where the best one is to be chosen."""
+        s = self.settings
+        # (6) While all rewards were 0, values have no order: the agent searches by random actions
+        #     that last, and for twice as many steps after the first reward, too.
+        must_explore = self.n_random_left > 0 or self.lacks_rewards()
+        self.n_random_left = max(self.n_random_left - 1, 0)
+        self.n_steps += 1
+        if self.is_excursion and (self.n_kept == 0 or self.epsilon() == 0):
+            self.n_kept, self.is_excursion = 0, False
+        self.skips_learning = self.is_excursion
+        if self.n_kept > 0:
+            self.n_kept -= 1
+            return self.worst(state) if self.is_excursion else self.kept_action
+        if not must_explore and self.exploration.uniform() >= self.epsilon():
+            return None
+        # (7) A random action is kept for at least k steps with probability 1 / k. Each episode that
+        #     terminates halves the longest duration, down to 5 steps.
+        longest = max(s.max_action_repeat >> self.n_terminated, min(5, s.max_action_repeat))
+        # (8) In endless episodes, those of more than 2,000 steps, a fourth of these draws begins an
+        #     excursion from good states: its steps take the worst action, and are not learned.
+        is_long = self.n_steps > 2000 and s.max_action_repeat > 1 and not must_explore
+        self.is_excursion = is_long and self.repetitions.below(4) == 0
+        self.skips_learning = self.is_excursion
+        if self.is_excursion:
+            self.n_kept = self.repetitions.below(longest)
+            return self.worst(state)
+        n_actions = np.diff(self.first_rows)
+        self.kept_action = [self.exploration.below(int(n)) for n in n_actions]
+        if must_explore:
+            self.n_kept = self.repetitions.below(s.max_action_repeat // 2)
+        else:
+            self.n_kept = int(min(1 / (1 - self.repetitions.uniform()), longest)) - 1
+        return self.kept_action
 
     def worst(self, state):
         parts = self.sums(self.code(state), self.weights)
@@ -229,6 +248,8 @@ class QLambda:
             n_bits += 1
         self.weights += rounded(rounded(step, n_bits) * self.trace, 12 - n_bits)
         self.weights[rows] -= rounded(drift * rate, 28) * x
+        # x ^ (x >> 63) is x, or -x - 1 if x < 0. The bitwise OR of all has as many bits as the
+        # largest. A doubled unit takes a bit away, unless rounding brings a weight up to 2^23.
         largest = int(np.bitwise_or.reduce(self.weights ^ self.weights >> 63, None))
         while largest >= 2**23:
             self.double_unit()
@@ -245,7 +266,10 @@ class QLambda:
         self.trace = clipped(self.trace, 17)
 
     def update_average(self):
-        """Move the average to the weights by about 3 / (n + 3) of the way, rounded to 2^-n_bits."""
+        """Move the average to the weights by about 3 / (n + 3) of the way, for snapshot n from 0.
+
+        The share of the way is rounded up to a power of two, 2^-n_bits; it is at least 2^-10.
+        """
         self.n_corrections += 1
         if self.n_corrections % self.settings.averaging_interval == 0:
             n_bits = (self.n_snapshots // 3 + 1).bit_length() - 1
@@ -256,9 +280,11 @@ class QLambda:
     #     need more than 23 bits, or a value more than 33.
 
     def units_of(self, reward):
+        """Return a reward as a number of units, rounded."""
         return math.floor(math.ldexp(reward, -(self.exponent or 0)) + 0.5)
 
     def fit_unit(self, reward):
+        """Make the unit large enough for a reward."""
         if reward != 0.0 and self.exponent is None:
             self.exponent = math.frexp(reward)[1] - 31
         while reward != 0.0 and abs(math.ldexp(reward, -self.exponent)) >= 2**32:

@@ -66,6 +66,7 @@ class Random:
         return (self.bits() >> 11) / 2**53
 
     def below(self, n):
+        """Return a whole number below n; bits that would favour small numbers are drawn again."""
         while (drawn := self.bits()) < 2**64 % n:
             pass
         return drawn % n
@@ -119,7 +120,8 @@ class SDNNC:
             pair: Random(s.seed, PERMUTATIONS, i).shuffled(range(s.n_pattern_units))
             for i, pair in enumerate(pairs)
         }
-        # (1.7) Weights -1, 0 or 1, of two random bits each; large thresholds of alternating sign.
+        # (1.7) A weight is -1, 0 or 1: the difference of two random bits. 64 bits make those of 32
+        # hidden units. Thresholds are large and of alternating sign.
         n, n_columns = s.n_hidden_units, s.n_pattern_units * len(pairs)
         random = Random(s.seed, WEIGHTS)
         random_bits = [[random.bits() for _ in range(0, n, 32)] for _ in range(n_columns)]
@@ -162,6 +164,8 @@ class SDNNC:
         h = self.potentials(state)[first : first + s.n_active_units]
         d = g_inverse(q_hat, s) - int(np.sum(h > 0))
         step, n_corrected = self.step if d > 0 else -self.step, 0
+        # In each of |d| equal parts of the window, correct the unit nearest to its threshold that
+        # is on the wrong side of it.
         for i in range(abs(d)):
             begin, end = (j * s.n_active_units // abs(d) for j in (i, i + 1))
             candidates = begin + np.flatnonzero((h[begin:end] > 0) == (d < 0))

@@ -1,5 +1,5 @@
-// Any task, torques and states: the batch has the bits of single acrobots, and nothing that is not
-// a number gets out.
+// Any task, torques and states: the batch has the bits of single acrobots, and all results are
+// finite.
 #include <cmath>
 #include <cstddef>
 
@@ -18,7 +18,8 @@ void swing(FuzzedDataProvider& input) {
   environments::AcrobotConfig config;
   config.integration_step = 0.1;  // few steps a decision
   fuzz::change(config, input);
-  if (!(config.decision_interval / config.integration_step < 1e4)) return;  // allowed, but long
+  // More steps are allowed, but take long; NaN does not pass.
+  if (!(config.decision_interval / config.integration_step < 1e4)) return;
   std::vector<environments::Acrobot> singles(kAcrobots, environments::Acrobot(config));
   environments::AcrobotBatch batch(config, kAcrobots);
   std::vector<double> rewards(kAcrobots);
@@ -28,9 +29,10 @@ void swing(FuzzedDataProvider& input) {
     for (std::size_t i = 0; i < kAcrobots; ++i) {
       const auto numbers = fuzz::any_doubles(input, 4, -4.0, 4.0);
       const AcrobotState state(numbers[0], numbers[1], numbers[2], numbers[3]);
-      const bool set = fuzz::accepted([&] { singles[i].set_state(state); });
-      fuzz::expect(set == fuzz::accepted([&] { batch.set_state(i, state); }), "set_state differs");
-      if (!set) {
+      const bool is_set = fuzz::accepted([&] { singles[i].set_state(state); });
+      const bool is_set_in_batch = fuzz::accepted([&] { batch.set_state(i, state); });
+      fuzz::expect(is_set == is_set_in_batch, "set_state differs");
+      if (!is_set) {
         singles[i].reset();
         std::vector<std::uint8_t> mask(kAcrobots);
         mask[i] = 1;
@@ -39,9 +41,9 @@ void swing(FuzzedDataProvider& input) {
     }
     const auto torques = fuzz::any_doubles(input, kAcrobots, -config.max_torque, config.max_torque);
     const auto tolerances = fuzz::any_doubles(input, kAcrobots, 0.0, 1.0);
-    const bool moved = fuzz::accepted(
+    const bool is_stepped = fuzz::accepted(
         [&] { batch.step(torques, tolerances, all, {rewards, terminated, truncated}); });
-    if (!moved) continue;
+    if (!is_stepped) continue;
     for (std::size_t i = 0; i < kAcrobots; ++i) {
       const auto result = singles[i].step(torques[i], tolerances[i]);
       fuzz::expect(result.reward == rewards[i] && result.terminated == (terminated[i] != 0) &&
@@ -49,7 +51,7 @@ void swing(FuzzedDataProvider& input) {
                        singles[i].state() == batch.state(i),
                    "the batch differs from a single acrobot");
       fuzz::expect(batch.state(i).allFinite() && std::isfinite(rewards[i]),
-                   "what is not finite got out");
+                   "a state or reward is not finite");
     }
   }
 }

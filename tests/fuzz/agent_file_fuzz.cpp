@@ -1,4 +1,4 @@
-// Any bytes as a saved agent: where it loads it acts, learns and can be saved.
+// Any bytes as a saved agent: if it loads, it acts, learns and can be saved.
 #include <algorithm>
 #include <cmath>
 
@@ -7,7 +7,7 @@
 
 namespace {
 
-/// The bytes as a file whose checksum is right, so that the reader reads on.
+/// Returns the bytes with the right checksum at its place, so that the reader gets beyond it.
 std::vector<std::uint8_t> with_checksum(std::vector<std::uint8_t> file) {
   using namespace sdnn::core::detail;
   if (file.size() < kChecksumEnd) return file;
@@ -37,7 +37,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     }
     const std::string copy = "/dev/shm/sdnn_fuzz_" + std::to_string(::getpid());
     saved.write(copy);
-    const agents::AgentFile again(copy);
+    const agents::AgentFile loaded_copy(copy);
     ::unlink(copy.c_str());
   });
   return 0;

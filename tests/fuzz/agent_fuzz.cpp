@@ -1,5 +1,5 @@
 // Any configuration of an agent, then any states, actions, rewards and parameters: values stay in
-// their range, and a refused call changes nothing that a copy of the agent would do otherwise.
+// their range, and a state that is restored is the state that was saved.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -34,10 +34,11 @@ void save_and_restore(Agent& agent) {
   fuzz::expect(core::state_of(agent) == saved, "a restored state differs");
 }
 
+/// Acts, learns, begins episodes, and saves and restores the agent, in any order.
 template <class Agent>
 void use(Agent& agent, FuzzedDataProvider& input) {
   const std::size_t n_inputs = agent.n_inputs();
-  double pending = 0.0;
+  double last_reward = 0.0;  // of the last transition that was learned
   agent.begin_episode();
   while (input.remaining_bytes() > 0) {
     const auto state = fuzz::any_doubles(input, n_inputs, 0.0, 1.0);
@@ -59,20 +60,22 @@ void use(Agent& agent, FuzzedDataProvider& input) {
           const auto action = agent.act(state, true);
           agent.learn(state, action, reward, next, terminated);
         });
-        if (is_learned) pending = reward;
-        if constexpr (requires { agent.refine_unit(0, 0); }) {  // sizes are not below the last one
-          const int least = pending == 0.0 ? -1100 : std::ilogb(pending);
+        if (is_learned) last_reward = reward;
+        if constexpr (requires { agent.refine_unit(0, 0); }) {
+          // Requires sizes of rewards, as powers of two, of at least the last reward's.
+          const int least = last_reward == 0.0 ? -1100 : std::ilogb(last_reward);
           const int size = std::max(least, input.ConsumeIntegralInRange(-1100, 1100));
           if (input.ConsumeBool())
             agent.refine_unit(size, size + input.ConsumeIntegralInRange(0, 9));
         }
+        // Tiny and huge rewards change the unit of all values.
         if (reward != 0.0 && std::abs(std::log2(std::abs(reward))) > 30.0) save_and_restore(agent);
       }
     }
   }
 }
 
-void sdnn_c(FuzzedDataProvider& input) {
+void use_sdnn_c(FuzzedDataProvider& input) {
   approximators::SDNNCConfig config{.n_inputs = input.ConsumeIntegralInRange(2, 4),
                                     .n_pattern_units = 20,
                                     .n_interpolated = 4,
@@ -96,7 +99,7 @@ void sdnn_c(FuzzedDataProvider& input) {
   }
 }
 
-void rbf(FuzzedDataProvider& input) {
+void use_rbf(FuzzedDataProvider& input) {
   approximators::RBFNetworkConfig config{.n_inputs = 2, .n_bases = 3, .n_actions = 5};
   fuzz::change(config, input);
   config.max_table_bytes = kMostBytes;
@@ -114,7 +117,7 @@ void rbf(FuzzedDataProvider& input) {
   }
 }
 
-void fuzzy(FuzzedDataProvider& input) {
+void use_fuzzy(FuzzedDataProvider& input) {
   approximators::FuzzyRulesConfig rules{.n_inputs = 2, .n_sets = 3, .n_actions = 4};
   fuzz::change(rules, input);
   rules.max_table_bytes = kMostBytes;
@@ -126,14 +129,14 @@ void fuzzy(FuzzedDataProvider& input) {
   use(agent, input);
 }
 
-/// Numbers of actions of one or two dimensions.
+/// Returns the numbers of actions of one or two dimensions.
 std::vector<std::size_t> some_actions(FuzzedDataProvider& input) {
   std::vector<std::size_t> n_actions(input.ConsumeIntegralInRange<std::size_t>(1, 2));
   for (auto& n : n_actions) n = input.ConsumeIntegralInRange<std::size_t>(1, 9);
   return n_actions;
 }
 
-void linear(FuzzedDataProvider& input) {
+void use_q_lambda(FuzzedDataProvider& input) {
   approximators::LinearSDNNConfig config{.n_inputs = input.ConsumeIntegralInRange(2, 4),
                                          .n_pattern_units = 20,
                                          .n_interpolated = 4,
@@ -154,7 +157,7 @@ void linear(FuzzedDataProvider& input) {
   }
 }
 
-void actor_critic(FuzzedDataProvider& input) {
+void use_actor_critic(FuzzedDataProvider& input) {
   approximators::LinearSDNNConfig config{
       .n_inputs = input.ConsumeIntegralInRange(2, 4), .n_pattern_units = 20, .n_interpolated = 4};
   fuzz::change(config, input);
@@ -175,8 +178,8 @@ void actor_critic(FuzzedDataProvider& input) {
   fuzz::expect(std::isfinite(agent.value(state)), "a value is not finite");
 }
 
-/// An agent in the units of its task, with a history and short warm-up.
-void controller(FuzzedDataProvider& input) {
+/// Uses an agent in the units of its task, with a history and a short warm-up.
+void use_controller(FuzzedDataProvider& input) {
   using agents::History;
   const std::size_t n_variables = input.ConsumeIntegralInRange<std::size_t>(1, 3);
   agents::ControllerConfig config{
@@ -239,17 +242,17 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   sdnn::fuzz::accepted([&] {
     switch (input.ConsumeIntegralInRange(0, 5)) {
       case 0:
-        return sdnn_c(input);
+        return use_sdnn_c(input);
       case 1:
-        return rbf(input);
+        return use_rbf(input);
       case 2:
-        return linear(input);
+        return use_q_lambda(input);
       case 3:
-        return actor_critic(input);
+        return use_actor_critic(input);
       case 4:
-        return controller(input);
+        return use_controller(input);
       default:
-        return fuzzy(input);
+        return use_fuzzy(input);
     }
   });
   return 0;

@@ -23,34 +23,32 @@
 
 namespace sdnn::fuzz {
 
-/// Ends the run: libFuzzer keeps the input.
-[[noreturn]] inline void wrong(const char* what) {
-  std::fprintf(stderr, "wrong: %s\n", what);
+/// Ends the run with a message if the condition does not hold; libFuzzer then keeps the input.
+inline void expect(bool holds, const char* violation) {
+  if (holds) return;
+  std::fprintf(stderr, "wrong: %s\n", violation);
   std::abort();
 }
 
-inline void expect(bool holds, const char* what) {
-  if (!holds) wrong(what);
-}
-
-/// Does what may be refused, by an error with a message.
+/// Does a call; returns false if it is refused by an error, which must have a message.
 template <class Call>
 bool accepted(const Call& call) {
   try {
     call();
     return true;
   } catch (const std::exception& error) {
-    expect(std::strlen(error.what()) > 0, "an error says nothing");
+    expect(std::strlen(error.what()) > 0, "an error has no message");
     return false;
   }
 }
 
-/// Half of the time any double there is, else one in [low, high].
+/// Returns half of the time a double in [low, high], else one with any bits, NaN included.
 inline double any_double(FuzzedDataProvider& input, double low, double high) {
   if (input.ConsumeBool()) return input.ConsumeFloatingPointInRange(low, high);
   return std::bit_cast<double>(input.ConsumeIntegral<std::uint64_t>());
 }
 
+/// Returns n doubles: in an eighth of the calls as of `any_double`, else all in [low, high].
 inline std::vector<double> any_doubles(FuzzedDataProvider& input, std::size_t n, double low,
                                        double high) {
   std::vector<double> values(n);
@@ -61,6 +59,7 @@ inline std::vector<double> any_doubles(FuzzedDataProvider& input, std::size_t n,
   return values;
 }
 
+/// Sets a field of a configuration to a value that may be invalid.
 template <class Value>
 void set_any(Value& value, FuzzedDataProvider& input) {
   if constexpr (std::is_same_v<Value, bool>) {
@@ -96,7 +95,7 @@ void change(Config& config, FuzzedDataProvider& input) {
   }
 }
 
-/// Reads from these bytes as from a file.
+/// Returns a function that reads from these bytes as readers of files do.
 inline auto reader_of(std::span<const std::uint8_t> file) {
   return [file](std::uint64_t begin, std::span<std::byte> into) {
     const auto part = std::as_bytes(file).subspan(static_cast<std::size_t>(begin), into.size());

@@ -13,6 +13,7 @@ namespace {
 using namespace sdnn;
 using estimators::TrainingForm;
 
+/// Returns n integers: in an eighth of the calls any, else all in [low, high].
 std::vector<std::int32_t> any_integers(FuzzedDataProvider& input, std::size_t n, int low,
                                        int high) {
   std::vector<std::int32_t> values(n);

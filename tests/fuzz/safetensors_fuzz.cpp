@@ -1,4 +1,5 @@
-// Any bytes as a file of tensors; what can be read is the same after it was written and read.
+// Any bytes as a file of tensors: tensors that can be read are the same after they were written and
+// read again.
 #include "input.hpp"
 #include "sdnn/core/safetensors.hpp"
 

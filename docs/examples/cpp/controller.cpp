@@ -89,8 +89,8 @@ int main(int argc, char** argv) try {
   }
   controller.write(path);
 
-  agents::CompiledController again(path);
-  const Outcome test = run_episode(again, acrobot, lambda(n_episodes), false, rate);
+  agents::CompiledController loaded(path);
+  const Outcome test = run_episode(loaded, acrobot, lambda(n_episodes), false, rate);
   std::printf("%d %s %lld\n", test.n_decisions, test.solved ? "solved" : "-",
               static_cast<long long>(test.n_late));
 } catch (const std::exception& error) {

@@ -28,7 +28,8 @@ double target(std::int32_t i, std::int32_t j) {
 
 void run(int n_epochs, std::uint64_t seed) {
   using namespace sdnn;
-  // Each ordered pair of inputs has tables of its own: one pattern desensitized by the other.
+  // Each ordered pair of inputs has two tables: patterns of the first input, and those of the
+  // second that desensitize them.
   core::Random random(seed, core::Stream::code_books);
   const coding::RandomInverseConfig config{.n_units = 1000, .n_bins = kBins, .n_flipped = 10};
   std::vector<coding::PatternTable> modified;
@@ -42,7 +43,7 @@ void run(int n_epochs, std::uint64_t seed) {
   const auto layer = std::make_shared<estimators::ParallelPerceptron>(code, kUnits, seed);
 
   std::vector<std::int32_t> bins;
-  std::vector<double> counts;  // how many units should fire
+  std::vector<double> counts;  // the numbers of units that should fire
   core::Random points(seed, core::Stream::exploration);
   for (int t = 0; t < 500; ++t) {
     const auto i = static_cast<std::int32_t>(points.below(kBins));

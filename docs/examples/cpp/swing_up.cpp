@@ -48,12 +48,12 @@ int main(int argc, char** argv) try {
   const int n_episodes = argc > 1 ? std::stoi(argv[1]) : 300;
   const std::uint64_t seed = argc > 2 ? std::stoull(argv[2]) : 1;
 
-  const sdnn::environments::SensorConfig seen{.n_sensors = 4, .noise = 0.0};
-  const auto preset = sdnn::agents::robust_preset(seen.n_sensors);
+  const sdnn::environments::SensorConfig sensor_config{.n_sensors = 4, .noise = 0.0};
+  const auto preset = sdnn::agents::robust_preset(sensor_config.n_sensors);
   sdnn::agents::QLearning agent(Network(preset.approximator, seed), preset.learning, seed);
   sdnn::environments::Acrobot acrobot;
-  sdnn::environments::AcrobotSensors sensors(seen, seed, sdnn::core::Stream::sensor_noise);
-  sdnn::environments::AcrobotSensors test_sensors(seen, seed,
+  sdnn::environments::AcrobotSensors sensors(sensor_config, seed, sdnn::core::Stream::sensor_noise);
+  sdnn::environments::AcrobotSensors test_sensors(sensor_config, seed,
                                                   sdnn::core::Stream::evaluation_sensor_noise);
   const sdnn::environments::GoalSchedule lambda;
 

@@ -20,7 +20,7 @@ int32_t angle_before = 0;
 
 /* Angle in radians and speed in radians a second, times 2^POLE_FRACTION_BITS, which is 16 here. */
 void read_sensors(int32_t *observation) {
-  const int32_t turn = 411775; /* 2 pi */
+  const int32_t turn = 411775; /* 2 pi, times 2^16 */
   const int32_t angle = ((int32_t)analogRead(kEncoder) - 512) * (turn / 1024);
   int32_t moved = angle - angle_before;
   if (moved > turn / 2) moved -= turn;
@@ -35,7 +35,7 @@ void drive(int32_t torque) { /* -2, 0 or 2, times 2^16 */
   analogWrite(kMotor, torque == 0 ? 0 : 255);
 }
 
-/* -(angle^2 + speed^2 / 10), times 2^16. */
+/* -(angle^2 + speed^2 / 10), times 2^16: the product of two numbers times 2^8. */
 int32_t reward_of(const int32_t *observation) {
   const int32_t angle = observation[0] / 256, speed = observation[1] / 256;
   return -(angle * angle + speed * (speed / 10));
