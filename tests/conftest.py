@@ -1,3 +1,5 @@
+"""Fixtures for tests of all folders: tools that may be missing, commands, stores and studies."""
+
 import functools
 import os
 import re
@@ -16,7 +18,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 def pytest_configure():
-    """Hear Ctrl-C: a shell that starts tests in the background has them ignore it."""
+    """Handle Ctrl-C, which tests send: shells let processes in the background ignore it."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -35,6 +37,7 @@ def skip_unless_ci():
 
 @pytest.fixture(scope="module")  # its event loop ends with the module
 def chromium(skip_unless_ci):
+    """Chromium, without a window, as a browser of playwright."""
     try:
         from playwright.sync_api import sync_playwright
     except ImportError:
@@ -49,14 +52,16 @@ def chromium(skip_unless_ci):
         browser.close()
 
 
-PACKAGES = dict.fromkeys(("clang", "clang++"), "clang libclang-rt-dev")
-PACKAGES |= dict.fromkeys(("nm", "objdump"), "binutils")
-PACKAGES |= {
+PACKAGES = {
+    "clang": "clang libclang-rt-dev",
+    "clang++": "clang libclang-rt-dev",
+    "nm": "binutils",
+    "objdump": "binutils",
     "arm-none-eabi-gcc": "gcc-arm-none-eabi picolibc-arm-none-eabi",
     "riscv64-unknown-elf-gcc": "gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf",
     "qemu-system-riscv32": "qemu-system-misc",
 }
-"""The package to install for a tool, where its name differs."""
+"""The packages to install for a tool, where they have other names."""
 
 
 @functools.cache
@@ -77,13 +82,14 @@ def needs(skip_unless_ci):
         for tool in tools:
             is_compiler = re.search(r"(cc|clang|\+\+)$", tool)
             if shutil.which(tool) is None or (is_compiler and not _links(tool, tuple(options))):
-                words = " ".join((tool, *options))
-                skip_unless_ci(f"needs {words}: apt install {PACKAGES.get(tool, tool)}")
+                command = " ".join((tool, *options))
+                skip_unless_ci(f"needs {command}: apt install {PACKAGES.get(tool, tool)}")
 
     return _needs
 
 
 def _tool(name):
+    """Return the path of a program on the path or beside this Python, or None."""
     beside = Path(sys.executable).with_name(name)
     return shutil.which(name) or (str(beside) if beside.exists() else None)
 
@@ -110,7 +116,7 @@ def cmake(skip_unless_ci):
 
 @pytest.fixture(scope="session")
 def configure(cmake):
-    """Configures a source folder into a build folder."""
+    """Configures a source folder into a build folder; returns the finished process."""
 
     def _configure(source, build, *options):
         generator = ["-G", "Ninja"] if _tool("ninja") else []
@@ -121,7 +127,7 @@ def configure(cmake):
 
 @pytest.fixture
 def use_trial(monkeypatch):
-    """Let every agent run in trials of another kind."""
+    """Let all agents run their trials in another class, such as `fake_trial.FakeTrial`."""
     from fake_trial import agents_with
     from sdnn.runs import AGENTS
 
@@ -134,7 +140,10 @@ def use_trial(monkeypatch):
 
 @pytest.fixture
 def invoke(monkeypatch, tmp_path, use_trial):
-    """Call the command in an empty folder, with another kind of trials if one is given."""
+    """Calls `sdnn` in an empty folder; returns click's result.
+
+    ``trial`` is a class of trials for all agents (see `use_trial`). Exceptions are not caught.
+    """
     from sdnn.cli import main
 
     monkeypatch.chdir(tmp_path)
@@ -150,12 +159,12 @@ def invoke(monkeypatch, tmp_path, use_trial):
 
 @pytest.fixture
 def refused(invoke):
-    """Call a command that must fail with an exit code and print no result; return its error."""
+    """Calls a command that must fail with an exit code and print no result; returns its error."""
 
     def _refused(*arguments, code):
         result = invoke(*arguments)
         assert (result.exit_code, result.stdout) == (code, ""), result.output
-        assert code == 2 or result.stderr.count("\n") == 1, "errors of usage only have more lines"
+        assert code == 2 or result.stderr.count("\n") == 1, "only errors of usage have more lines"
         return result.stderr
 
     return _refused
@@ -163,7 +172,10 @@ def refused(invoke):
 
 @pytest.fixture
 def run(use_trial):
-    """Run a plan into the store of a folder, with fake trials; returns outcome and digest."""
+    """Runs a plan into the store of a folder, with fake trials.
+
+    Returns the outcome, and the digest of all rows in the store.
+    """
     from fake_trial import FakeTrial, make_plan
     from sdnn.runs import ResultStore, run_trials
     from sdnn.runs.trial import records_digest
@@ -179,7 +191,7 @@ def run(use_trial):
 
 @pytest.fixture
 def collected():
-    """Measure stored trials as the results of an experiment."""
+    """Measures the stored trials of an experiment in a folder; returns its results."""
     from sdnn.reproduction import plan_trials
     from sdnn.reproduction.reproduce import collect, specs_of
     from sdnn.runs import ResultStore
@@ -196,7 +208,7 @@ def collected():
 
 @pytest.fixture
 def study(tmp_path, monkeypatch):
-    """Write a study file and read it; the folder stays importable for the test only."""
+    """Writes a study file and reads it; modules beside it can be imported in the test only."""
     from sdnn.reproduction.reproduce import ClaimStudy
 
     monkeypatch.setattr(sys, "path", [*sys.path])

@@ -1,4 +1,4 @@
-"""A scheduler and workers on this machine, as processes that tests may hurt."""
+"""A scheduler and workers of Dask on this machine, as processes that tests may kill or freeze."""
 
 import contextlib
 import os
@@ -20,7 +20,17 @@ SETTINGS = {
 
 
 class Cluster:
-    """A context manager that leaves no process behind."""
+    """A scheduler and its workers, which end with the context.
+
+    Attributes
+    ----------
+    file : Path
+        The file that has the scheduler's address.
+    settings : dict of str to str
+        Variables of the environment of processes that are started later.
+    workers : list of Popen
+        The nannies: each starts its worker, and starts another one if that ends.
+    """
 
     def __init__(self, folder):
         self.folder = folder
@@ -40,12 +50,12 @@ class Cluster:
         self._log.close()
 
     def start_scheduler(self):
-        """Start it at another port; the scheduler file has its address."""
+        """Start a scheduler at a free port, and write its file."""
         self.file.unlink(missing_ok=True)
         self.scheduler = self._start("scheduler", "--port", "0")
 
     def add_worker(self, code=""):
-        """Start a worker with one thread, which runs `code` first, and its nanny."""
+        """Start a nanny, and by it a worker with one thread, which runs `code` first."""
         options = ()
         if code:
             path = self.folder / f"preload_{len(self.workers)}.py"
@@ -65,9 +75,11 @@ class Cluster:
     def computing(self):
         """Return the processes that run trials: each is a child of its nanny."""
         with contextlib.suppress(psutil.Error):
-            children = [c for w in self.workers for c in psutil.Process(w.pid).children()]
-            return [c for c in children if "spawn_main" in " ".join(c.cmdline())]
-        return []
+            children = [
+                child for nanny in self.workers for child in psutil.Process(nanny.pid).children()
+            ]
+            return [child for child in children if "spawn_main" in " ".join(child.cmdline())]
+        return []  # a process ended meanwhile
 
     def _start(self, *command):
         return subprocess.Popen(

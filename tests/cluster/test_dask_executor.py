@@ -1,4 +1,7 @@
-"""Trials on a real cluster: the rows of a local run, whatever is lost meanwhile."""
+"""Trials on a real cluster have the rows of a local run, whatever is lost meanwhile.
+
+Experiment A has two cases: a plan of n trials has 2 n.
+"""
 
 import json
 import random
@@ -52,11 +55,11 @@ def test_rows_of_a_cluster_are_those_of_a_local_run(pair, tmp_path):
     assert outcome.n_run == 6
     assert digest == run(tmp_path / "here", plan)[1]
     for planned in plan:
-        mine = [event for event in recorder.events if event[1] == planned.key]
-        assert mine[0] == ("advanced", planned.key, 0)
-        assert mine[-1] == ("finished", planned.key)
-    again, _ = run(tmp_path / "cluster", plan, pair)
-    assert (again.n_reused, again.n_run) == (6, 0)
+        events = [event for event in recorder.events if event[1] == planned.key]
+        assert events[0] == ("advanced", planned.key, 0)
+        assert events[-1] == ("finished", planned.key)
+    second_outcome, _ = run(tmp_path / "cluster", plan, pair)
+    assert (second_outcome.n_reused, second_outcome.n_run) == (6, 0)
 
 
 def test_two_drivers_of_the_same_trials_get_the_same_rows(pair, tmp_path):
@@ -91,28 +94,27 @@ def test_trials_of_gymnasium_environments_have_the_rows_of_a_local_run(pair, tmp
         PlannedTrial(TrialKey("pendulum", "sdnn-c", trial, trial, spec.config_hash), spec)
         for trial in range(2)
     ]
-    recorder = Recorder()
-    outcome, digest = run(tmp_path / "there", plan, pair, recorder)
+    outcome, digest = run(tmp_path / "there", plan, pair)
     assert outcome.n_run == 2
     assert digest == run(tmp_path / "here", plan)[1]
 
 
 def test_long_trials_report_progress_and_free_their_workers_when_interrupted(pair, tmp_path):
-    stop = threading.Event()
     plan = make_plan(1, 10_000_000)
-    messages = []
-    for message in DaskExecutor(str(pair.file)).run(plan, stop):
-        messages.append(message)
-        if getattr(message, "episode", 0) > 0:
-            stop.set()
-    assert 0 < messages[-1].episode < 10_000_000
-    # An interruption frees the workers: the trials would take minutes. The same ones may be wanted
-    # again while a worker still gives them up.
-    stop.clear()
-    for message in DaskExecutor(str(pair.file)).run(plan, stop):
-        assert not isinstance(message, Failed)
-        if getattr(message, "episode", 0) > 0:
-            stop.set()
+
+    def messages_until_progress():
+        """Run the trials, and interrupt them at the first report of a finished episode."""
+        stop, messages = threading.Event(), []
+        for message in DaskExecutor(str(pair.file)).run(plan, stop):
+            messages.append(message)
+            if getattr(message, "episode", 0) > 0:
+                stop.set()
+        return messages
+
+    assert 0 < messages_until_progress()[-1].episode < 10_000_000
+    # These trials can run again at once, although a worker may still be giving them up.
+    assert not any(isinstance(message, Failed) for message in messages_until_progress())
+    # The workers are free for other trials: the interrupted ones would take minutes.
     begin = time.monotonic()
     assert run(tmp_path, make_plan(1, 10), pair)[0].n_run == 2
     assert time.monotonic() - begin < 20
@@ -120,7 +122,7 @@ def test_long_trials_report_progress_and_free_their_workers_when_interrupted(pai
 
 def test_a_failing_trial_does_not_stop_the_others(pair, tmp_path):
     plan = list(make_plan(2))
-    plan[0] = PlannedTrial(plan[0].key._replace(seed=-1), plan[0].spec)
+    plan[0] = PlannedTrial(plan[0].key._replace(seed=-1), plan[0].spec)  # seeds are not negative
     outcome, _ = run(tmp_path, plan, pair)
     assert outcome.n_run == 3
     (failure,) = outcome.failures
@@ -139,7 +141,7 @@ def test_an_agent_unknown_to_workers_is_refused_by_name(pair, tmp_path, monkeypa
         run(tmp_path, plan, pair, timeout=3.0)
 
 
-UNFIT = {
+UNFIT_WORKERS = {
     f"it has sdnn 0.0.9, this is sdnn {sdnn.__version__}": """
         from sdnn import _core
         _core.__version__ = "0.0.9"
@@ -160,28 +162,30 @@ UNFIT = {
 
 
 def test_workers_with_other_code_get_no_trials(cluster, tmp_path):
-    """Where there are only such workers the run fails; beside them a fitting one runs all."""
-    for code in UNFIT.values():
+    for code in UNFIT_WORKERS.values():
         cluster.add_worker(code)
     recorder = Recorder()
-    with pytest.raises(ClusterError, match="worker tcp://"):
+    with pytest.raises(ClusterError, match="worker tcp://"):  # no other workers
         run(tmp_path / "out", make_plan(), cluster, recorder, timeout=8.0)
-    for words in UNFIT:
-        assert any(words in note for note in recorder.notes), (words, recorder.notes)
-    cluster.add_worker()
+    for reason in UNFIT_WORKERS:
+        assert any(reason in note for note in recorder.notes), (reason, recorder.notes)
+    cluster.add_worker()  # which has the code of this process, and runs all trials
     outcome, digest = run(tmp_path / "out", make_plan(6), cluster)
     assert outcome.n_run == 12
     assert not outcome.failures
     assert digest == run(tmp_path / "here", make_plan(6))[1]
 
 
-POISON = """
+"""Notes about workers, and the code that makes a worker unfit so."""
+
+
+KILLED_BY_SEED = """
 import os
 from dataclasses import replace
 from sdnn import _core
 from sdnn.runs import AGENTS
 
-class Poison:
+class KillsItsWorker:
     def __init__(self, *, seed, **parts):
         self.trial = core_trial(seed=seed, **parts)
         self.kills = seed == {seed}
@@ -195,11 +199,13 @@ class Poison:
             os._exit(1)
 
 core_trial = _core.AcrobotTrial
-AGENTS["sdnn-c"] = replace(AGENTS["sdnn-c"], core_trial=Poison)
+AGENTS["sdnn-c"] = replace(AGENTS["sdnn-c"], core_trial=KillsItsWorker)
 """
+"""Code of a worker that ends where it runs the trial with a seed."""
 
 
-@pytest.mark.parametrize("allowed_failures", ["1", "10"])  # or till all workers were lost
+# A trial is given up after it has killed 1 worker, or 10, where all workers are lost before.
+@pytest.mark.parametrize("allowed_failures", ["1", "10"])
 def test_a_trial_that_kills_its_workers_does_not_stop_the_others(
     cluster, tmp_path, monkeypatch, allowed_failures
 ):
@@ -210,7 +216,7 @@ def test_a_trial_that_kills_its_workers_does_not_stop_the_others(
     cluster.start_scheduler()
     plan = make_plan(3)
     for _ in range(2):
-        cluster.add_worker(POISON.format(seed=plan[1].key.seed))
+        cluster.add_worker(KILLED_BY_SEED.format(seed=plan[1].key.seed))
     outcome, _ = run(tmp_path, plan, cluster)
     assert outcome.n_run == 5
     (failure,) = outcome.failures
@@ -218,20 +224,21 @@ def test_a_trial_that_kills_its_workers_does_not_stop_the_others(
     assert isinstance(failure.error, WorkerLostError)
 
 
-@pytest.mark.parametrize("way", [signal.SIGKILL, signal.SIGSTOP])
-def test_killed_or_frozen_workers_do_not_change_the_rows(cluster, tmp_path, way):
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_killed_or_frozen_workers_do_not_change_the_rows(cluster, tmp_path, number):
     plan = make_plan(4, 600)
-    hurt = []
+    hurt_processes = []
 
-    def hurt_one():
+    def hurt_a_worker():
         process = random.choice(cluster.computing())
-        process.send_signal(way)
-        hurt.append(process)
+        process.send_signal(number)
+        hurt_processes.append(process)
 
     cluster.add_worker()
     cluster.add_worker()
-    outcome, digest = run(tmp_path / "out", plan, cluster, Recorder(hurt_one))
-    assert hurt
+    recorder = Recorder(on_finished=hurt_a_worker)  # after the second finished trial
+    outcome, digest = run(tmp_path / "out", plan, cluster, recorder)
+    assert hurt_processes
     assert (outcome.n_run, outcome.failures) == (8, ())
     assert digest == run(tmp_path / "here", plan)[1]
 
@@ -247,11 +254,11 @@ def test_a_command_continues_after_a_lost_scheduler(cluster, tmp_path):
     ) as driver:
         wait_for_rows(tmp_path / "out")
         cluster.kill(cluster.scheduler)
-        _, words = driver.communicate(timeout=60)
+        _, message = driver.communicate(timeout=60)
     assert driver.returncode == 1
-    assert "lost the scheduler" in words
-    assert "the same command continues" in words
-    assert "Traceback" not in words
+    assert "lost the scheduler" in message
+    assert "the same command continues" in message
+    assert "Traceback" not in message
     cluster.start_scheduler()
     cluster.add_worker()
     process = subprocess.run(command, capture_output=True, text=True, check=True)

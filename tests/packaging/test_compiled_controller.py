@@ -1,4 +1,4 @@
-"""The compiled C++ library in a CMake project elsewhere, beside the same agents in Python."""
+"""The compiled C++ library in a CMake project elsewhere has the bits of the agents in Python."""
 
 import re
 import subprocess
@@ -20,7 +20,7 @@ from sdnn.agents import (
 )
 
 pytestmark = pytest.mark.xdist_group("compiled controller")
-"""Every process of the tests would compile the library for itself."""
+"""Runs all tests in one process, as each process would compile the library."""
 
 ROOT = Path(__file__).parents[2]
 
@@ -62,7 +62,7 @@ CompiledController agent_of(const std::string& agent, const std::string& preset,
   return CompiledController(spec);
 }
 
-// Usage: robot OUT FIRST_STEP (IN | AGENT PRESET ACTION)
+// Usage: robot OUT FIRST_STEP (IN | AGENT PRESET ACTION). Learns for 60 steps, saves to OUT.
 int main(int argc, char** argv) try {
   CompiledController agent = argc == 4 ? CompiledController(argv[3])
                                        : agent_of(argv[3], argv[4], argv[5]);
@@ -73,8 +73,8 @@ int main(int argc, char** argv) try {
       state = {0.1 * (t / 20), 0.0};
       agent.begin_episode();
     }
-    const auto taken = agent.act(state);
-    const std::vector<double> action(taken.begin(), taken.end());
+    const auto chosen = agent.act(state);
+    const std::vector<double> action(chosen.begin(), chosen.end());
     const double speed = 0.9 * state[1] + 0.1 * action[0];
     const std::vector<double> next = {state[0] + 0.1 * speed, speed};
     agent.learn(state, action, -std::abs(next[0]), next, t % 40 == 39);
@@ -117,10 +117,10 @@ def robot(build):
     return run
 
 
-def live(agent, first):
-    """Act and learn in the plant of the program."""
+def learn_like_robot(agent, first_step):
+    """Act and learn for 60 steps in the task of the program robot, in Python."""
     state = np.zeros(2)
-    for t in range(first, first + 60):
+    for t in range(first_step, first_step + 60):
         if t % 20 == 0:
             state = np.array([0.1 * (t // 20), 0.0])
             agent.begin_episode()
@@ -163,24 +163,25 @@ SPACES = {
 def test_agents_in_cpp_have_the_bits_and_settings_of_python(
     agent_class, preset, action, robot, tmp_path
 ):
-    file, saved = tmp_path / "in-cpp.safetensors", tmp_path / "in-python.safetensors"
+    cpp_file, python_file = tmp_path / "in-cpp.safetensors", tmp_path / "in-python.safetensors"
     observations = gym.spaces.Box(
         np.array([-1.0, -np.inf]), np.array([1.0, np.inf]), dtype=np.float64
     )
     agent = agent_class(observations, SPACES[action], preset=preset, seed=3, warm_up_steps=30)
-    live(agent, 0)
-    robot(file, 0, agent_class.kind, preset or "", action)
-    loaded = load_agent(file)
+    # `agent` learns for 180 steps in Python alone, the other one in C++, Python and C++.
+    learn_like_robot(agent, 0)
+    robot(cpp_file, 0, agent_class.kind, preset or "", action)
+    loaded = load_agent(cpp_file)
     assert type(loaded) is agent_class
-    described = agent.description()
-    del described["observation_space"], described["action_space"]
-    assert loaded.description() == described
-    live(loaded, 60)
-    loaded.save(saved)
-    robot(file, 120, saved)
-    live(agent, 60)
-    live(agent, 120)
-    arrays, expected = load_agent(file).state(), agent.state()
+    settings = agent.description()
+    del settings["observation_space"], settings["action_space"]  # C++ knows no spaces
+    assert loaded.description() == settings
+    learn_like_robot(loaded, 60)
+    loaded.save(python_file)
+    robot(cpp_file, 120, python_file)
+    learn_like_robot(agent, 60)
+    learn_like_robot(agent, 120)
+    arrays, expected = load_agent(cpp_file).state(), agent.state()
     assert arrays.keys() == expected.keys()
     for name, array in expected.items():
         np.testing.assert_array_equal(arrays[name], array, name)

@@ -1,4 +1,4 @@
-"""Installed files, shipped files and imports."""
+"""The installed C++ library, the versions and stub of the Python package, and shipped files."""
 
 import os
 import re
@@ -25,7 +25,10 @@ STUB_COMMAND = "python tests/python/reference/core_stub.py > python/sdnn/_core.p
 
 
 def run_example(cmake, configure, build, *options, target="all"):
-    """Builds the example against an installed library; returns the lines it prints."""
+    """Build the programs of docs/examples/cpp with an installed library, and run swing_up.
+
+    Returns the words of each line that it prints, for 40 episodes with seed 7.
+    """
     quick = ("-DCMAKE_BUILD_TYPE=None", "-DCMAKE_CXX_FLAGS=-O1")
     process = configure(EXAMPLE, build, *quick, *options)
     assert process.returncode == 0, process.stdout + process.stderr
@@ -125,7 +128,7 @@ def test_cmake_finds_eigen_in_the_python_on_the_path(
         "cmake_minimum_required(VERSION 3.21)\nproject(finder LANGUAGES NONE)\n"
         f"include({(ROOT / 'cmake' / 'FindEigenAnyway.cmake').as_posix()})\n"
     )
-    monkeypatch.setenv("PATH", "")  # the folder of this Python is put before it
+    monkeypatch.setenv("PATH", "")  # the fixture `cmake` puts the folder of this Python before it
     monkeypatch.delenv("CMAKE_PREFIX_PATH", raising=False)
     build = tmp_path / "build"
     process = configure(tmp_path, build, "-DCMAKE_FIND_USE_CMAKE_SYSTEM_PATH=OFF")
@@ -155,25 +158,20 @@ def test_find_package_fails_without_eigen(required, configure, tmp_path):
 
 
 def test_no_build_file_has_options_for_a_processor():
-    rooms = [ROOT / name for name in ("cpp", "cmake", "tests", "bench", "docs", "python")]
-    builds = [ROOT / "CMakeLists.txt", ROOT / "pyproject.toml"]
+    folders = [ROOT / name for name in ("cpp", "cmake", "tests", "bench", "docs", "python")]
+    build_files = [ROOT / "CMakeLists.txt", ROOT / "pyproject.toml"]
     for pattern in ("CMakeLists.txt", "*.cmake*"):
-        builds += [path for room in rooms for path in room.rglob(pattern)]
-    assert len(builds) > 5
-    for path in builds:
+        build_files += [path for folder in folders for path in folder.rglob(pattern)]
+    assert len(build_files) > 5
+    for path in build_files:
         assert not re.search(r"-m(arch|tune|cpu)=|ffast-math", path.read_text()), path
 
 
 # The Python package.
 
 
-def test_the_version_of_the_package_is_that_of_cmake():
-    text = (ROOT / "CMakeLists.txt").read_text()
-    assert sdnn.__version__ == re.search(r"project\(sdnn VERSION ([0-9.]+)", text)[1]
-
-
 def test_all_files_that_name_the_version_name_the_same():
-    places = {
+    patterns = {
         "CMakeLists.txt": r"project\(sdnn VERSION ([0-9.]+)",
         "cpp/include/sdnn/core/version.hpp": r'kVersion = "([^"]+)"',
         "CITATION.cff": r"(?m)^version: (.+)$",
@@ -182,7 +180,7 @@ def test_all_files_that_name_the_version_name_the_same():
         "CHANGELOG.md": r"(?m)^## ([0-9.]+)( \([0-9-]{10}\))?$",
     }
     versions = {
-        path: re.search(rule, (ROOT / path).read_text())[1] for path, rule in places.items()
+        path: re.search(pattern, (ROOT / path).read_text())[1] for path, pattern in patterns.items()
     }
     assert set(versions.values()) == {sdnn.__version__}, versions
 
@@ -249,17 +247,18 @@ def sdist(tmp_path_factory):
 
 
 def names_in(sdist):
+    """Return the paths of the files of a source distribution, below its only folder."""
     with tarfile.open(sdist) as archive:
         names = [member.name for member in archive.getmembers() if member.isfile()]
-    top = {name.partition("/")[0] for name in names}
-    assert len(top) == 1, top
+    folders = {name.partition("/")[0] for name in names}
+    assert len(folders) == 1, folders
     return {name.partition("/")[2] for name in names}
 
 
 def test_the_source_distribution_has_listed_files_only(sdist):
-    rule = re.compile("|".join(f"(?:{pattern})" for pattern in SHIPPED))
-    strangers = [name for name in sorted(names_in(sdist)) if not rule.fullmatch(name)]
-    assert strangers == []
+    shipped = re.compile("|".join(f"(?:{pattern})" for pattern in SHIPPED))
+    unlisted = [name for name in sorted(names_in(sdist)) if not shipped.fullmatch(name)]
+    assert unlisted == []
 
 
 def test_the_source_distribution_has_all_files_that_a_build_needs(sdist):
@@ -296,5 +295,6 @@ def test_a_wheel_built_from_the_source_distribution_is_complete(sdist, tmp_path)
     assert expected <= names
     assert any(re.fullmatch(r"sdnn/_core\..*(so|pyd)", name) for name in names)
     assert not any("Eigen/" in name or name.startswith("tests") for name in names)
-    # The extension takes most of it: debug symbols or data by mistake would exceed the limit.
+    # The extension takes most of it. The limit is chosen so that debug symbols, or data by mistake,
+    # would exceed it.
     assert wheel.stat().st_size < 2_500_000

@@ -11,9 +11,9 @@ import pytest
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "docs" / "examples" / "cpp"
 
-STAND_IN = """
+LOCAL_PACKAGE = """
 from conan import ConanFile
-class Found(ConanFile):
+class LocalPackage(ConanFile):
     name, version, package_type = "{name}", "{version}", "header-library"
     def package_info(self):
         self.cpp_info.set_property("cmake_file_name", "{file}")
@@ -21,11 +21,12 @@ class Found(ConanFile):
         self.cpp_info.includedirs = [r"{include}"]
         self.cpp_info.bindirs = self.cpp_info.libdirs = []
 """
-"""A package of headers that this machine has, in the place of the one of Conan's server."""
+"""Recipe of a package of headers that this machine has, instead of that of Conan's server."""
 
 
 @pytest.fixture
 def conan(needs, tmp_path):
+    """Runs conan, with an empty cache; returns what it prints."""
     needs("conan", "g++")
 
     def run(*arguments):
@@ -42,18 +43,18 @@ def conan(needs, tmp_path):
 
 
 def include_folder(target, configure, folder):
-    """Finds the headers of a target of CMake on this machine."""
+    """Return the folder of the headers of a CMake target, as CMake finds it on this machine."""
     folder.mkdir()
     find_eigen = (ROOT / "cmake" / "FindEigenAnyway.cmake").as_posix()
     (folder / "CMakeLists.txt").write_text(
         "cmake_minimum_required(VERSION 3.21)\nproject(finder LANGUAGES CXX)\n"
         f"include({find_eigen})\nfind_package(nlohmann_json REQUIRED)\n"
-        f"get_target_property(found {target} INTERFACE_INCLUDE_DIRECTORIES)\n"
-        'message(STATUS "found: ${found}")\n'
+        f"get_target_property(folders {target} INTERFACE_INCLUDE_DIRECTORIES)\n"
+        'message(STATUS "folders: ${folders}")\n'
     )
     process = configure(folder, folder / "build")
     assert process.returncode == 0, process.stdout + process.stderr
-    return re.search(r"found: ([^;\n]+)", process.stdout)[1]
+    return re.search(r"folders: ([^;\n]+)", process.stdout)[1]
 
 
 def test_the_cpp_example_builds_with_conan(conan, cmake, configure, tmp_path):
@@ -64,7 +65,7 @@ def test_the_cpp_example_builds_with_conan(conan, cmake, configure, tmp_path):
         values = {"name": name, "version": version, "target": target, "file": target.split(":")[0]}
         include = include_folder(target, configure, tmp_path / name)
         recipe = tmp_path / f"{name}.py"
-        recipe.write_text(STAND_IN.format(**values, include=include))
+        recipe.write_text(LOCAL_PACKAGE.format(**values, include=include))
         conan("create", recipe)
     standard = ("-s:a", "compiler.cppstd=20")
     conan("create", ROOT, *standard)
@@ -89,5 +90,6 @@ def test_the_vcpkg_port_has_the_version_and_dependencies():
     port = ROOT / "cmake" / "vcpkg" / "sdnn"
     manifest = json.loads((port / "vcpkg.json").read_text())
     assert f"VERSION {manifest['version']} " in (ROOT / "CMakeLists.txt").read_text()
-    assert {"eigen3", "nlohmann-json"} <= {str(one) for one in manifest["dependencies"]}
+    names = {dependency for dependency in manifest["dependencies"] if isinstance(dependency, str)}
+    assert names == {"eigen3", "nlohmann-json"}
     assert (port / "../../..").resolve() == ROOT.resolve()  # where the port looks for it
