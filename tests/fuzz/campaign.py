@@ -3,10 +3,13 @@
     python tests/fuzz/campaign.py --out FOLDER [--seconds 60] [--executions N] [--max-bytes N]
         [TARGET ...]
 
-Each target runs for so many seconds or executions. ``FOLDER/counts.json`` has the executions of
-each commit and target. A later call continues with the corpora and numbers of the earlier ones and
-adds its executions. Small inputs in C++ are up to ten times as quick. What fails is in
-``FOLDER/TARGET``; ``--number N`` repeats one execution of a reader in Python.
+A target is a program of libFuzzer in C++, or a reader of damaged_files.py in Python, whose
+executions are numbered mutations of good files. Each runs for that many seconds or executions, and
+writes its faults to ``FOLDER/TARGET``; ``--number N`` repeats one execution of a reader.
+
+``FOLDER/counts.json`` has the executions of each commit and target. A later call continues with the
+corpora and numbers of the earlier ones and adds its executions. Small inputs in C++ are up to ten
+times as quick.
 """
 
 import argparse
@@ -28,23 +31,25 @@ from watched_cells import failures  # noqa: E402
 
 BUILD = ROOT / "build" / "fuzz" / "tests" / "fuzz"
 SEEDS = {"agent_file_fuzz": ["agents", "files"], "safetensors_fuzz": ["agents", "files"]}
-"""Folders of tests/data, beside the target's corpus."""
+"""Folders of tests/data with further seeds of a target, beside its corpus."""
 
 MOST_FAULTS = 50
-PER_WORKER = 2000
-"""Executions of a reader in a process."""
+"""Number of faults after which a reader is not tried further."""
+
+EXECUTIONS_OF_PROCESS = 2000
+"""Executions of a reader in one process; the time is looked at after each."""
 
 
 def run_cpp(name, seconds, executions, out, max_bytes):
     """Run a target of libFuzzer; return its executions and faults."""
-    found = out / name
-    found.mkdir(parents=True, exist_ok=True)
-    corpora = [found, ROOT / "tests" / "fuzz" / "corpus" / name]
+    folder = out / name  # new inputs that reach other code, and faults
+    folder.mkdir(parents=True, exist_ok=True)
+    corpora = [folder, ROOT / "tests" / "fuzz" / "corpus" / name]
     corpora += [ROOT / "tests" / "data" / folder for folder in SEEDS.get(name, ())]
     limits = ["-rss_limit_mb=1024", "-timeout=10", f"-max_len={max_bytes}", "-len_control=10"]
     limits += [f"-max_total_time={seconds}", f"-runs={executions or -1}"]
     done = subprocess.run(
-        [BUILD / name, *limits, f"-artifact_prefix={found}/fault-", "-print_final_stats=1",
+        [BUILD / name, *limits, f"-artifact_prefix={folder}/fault-", "-print_final_stats=1",
          "-verbosity=0", *corpora],
         stderr=subprocess.PIPE, text=True, errors="replace", check=False,
     )  # fmt: skip
@@ -54,12 +59,16 @@ def run_cpp(name, seconds, executions, out, max_bytes):
 
 
 def run_python(name, seconds, executions, out, first):
-    """Let a reader read mutations from a number on; return how many, and faults."""
+    """Let a reader read mutations with the numbers from ``first`` on.
+
+    Without ``executions`` the number of mutations is not limited. Returns how many it read, and the
+    faults.
+    """
     number, faults = first, []
     last = first + executions if executions else sys.maxsize
     until = time.monotonic() + seconds
     while number < last and time.monotonic() < until and len(faults) < MOST_FAULTS:
-        n_mutations = min(last - number, PER_WORKER)
+        n_mutations = min(last - number, EXECUTIONS_OF_PROCESS)
         faults += failures(mutation_cells, name, number, n_mutations)[1]
         number += n_mutations
     if faults:
@@ -69,32 +78,38 @@ def run_python(name, seconds, executions, out, first):
     return number - first, faults
 
 
-def timed(name, cpp, given, first):
+def timed(name, is_cpp, options, first):
     """Run a target; return its executions, its faults and the seconds."""
     began = time.monotonic()
-    if cpp:
-        done, faults = run_cpp(name, given.seconds, given.executions, given.out, given.max_bytes)
+    limits = options.seconds, options.executions, options.out
+    if is_cpp:
+        n_executions, faults = run_cpp(name, *limits, options.max_bytes)
     else:
-        done, faults = run_python(name, given.seconds, given.executions, given.out, first)
-    return done, faults, time.monotonic() - began
+        n_executions, faults = run_python(name, *limits, first)
+    return n_executions, faults, time.monotonic() - began
 
 
-def count(counts, name, **numbers):
-    """Add what a target did to the counts of the present commit."""
-    own = counts.setdefault(commit(), {}).setdefault(name, dict.fromkeys(numbers, 0))
+def add_counts(counts, name, **numbers):
+    """Add the numbers of a run to the counts of a target and the present commit."""
+    totals = counts.setdefault(commit(), {}).setdefault(name, dict.fromkeys(numbers, 0))
     for key, number in numbers.items():
-        own[key] = round(own[key] + number)
+        totals[key] = round(totals[key] + number)
+
+
+def n_executions_of(counts, name):
+    """Return the executions of a target in all commits."""
+    return sum(targets[name]["executions"] for targets in counts.values() if name in targets)
 
 
 def commit():
-    """The commit of the work tree."""
+    """Return the short hash of the commit of the work tree, or "unknown"."""
     arguments = ["git", "-C", ROOT, "rev-parse", "--short", "HEAD"]
     done = subprocess.run(arguments, capture_output=True, text=True, check=False)
     return done.stdout.strip() or "unknown"
 
 
 def main():
-    cpp = sorted(path.stem for path in (ROOT / "tests" / "fuzz").glob("*_fuzz.cpp"))
+    cpp_targets = sorted(path.stem for path in (ROOT / "tests" / "fuzz").glob("*_fuzz.cpp"))
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("targets", nargs="*", metavar="TARGET", help="default: all")
     parser.add_argument("--out", type=Path, required=True)
@@ -103,34 +118,36 @@ def main():
     parser.add_argument("--max-bytes", type=int, default=16384, help="of an input in C++")
     parser.add_argument("--jobs", type=int, default=1, help="targets at a time")
     parser.add_argument("--number", type=int, help="an execution of a reader to repeat")
-    given = parser.parse_args()
-    known = [*cpp, *MUTATED]
-    if unknown := set(given.targets).difference(known):
+    options = parser.parse_args()
+    known = [*cpp_targets, *MUTATED]
+    if unknown := set(options.targets).difference(known):
         parser.error(f"unknown: {', '.join(sorted(unknown))}; possible: {', '.join(known)}")
-    if given.number is not None:
+    if options.number is not None:
         with tempfile.TemporaryDirectory(dir="/dev/shm") as folder:
             os.chdir(folder)
-            sys.exit(read_mutation(given.targets[0], given.number) or 0)
-    given.out.mkdir(parents=True, exist_ok=True)
-    path = given.out / "counts.json"
+            sys.exit(read_mutation(options.targets[0], options.number) or 0)
+    options.out.mkdir(parents=True, exist_ok=True)
+    path = options.out / "counts.json"
     counts = json.loads(path.read_text()) if path.exists() else {}
     n_faults = 0
-    with concurrent.futures.ThreadPoolExecutor(given.jobs) as pool:
+    with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
         runs = {}
-        for name in given.targets or known:
-            first = sum(own.get(name, {}).get("executions", 0) for own in counts.values())
-            runs[pool.submit(timed, name, name in cpp, given, first)] = name
+        for name in options.targets or known:
+            first = n_executions_of(counts, name)
+            runs[pool.submit(timed, name, name in cpp_targets, options, first)] = name
         for run in concurrent.futures.as_completed(runs):
-            done, faults, took = run.result()
+            n_executions, faults, seconds = run.result()
             name = runs[run]
-            count(counts, name, executions=done, seconds=took, faults=len(faults))
+            add_counts(counts, name, executions=n_executions, seconds=seconds, faults=len(faults))
             path.write_text(json.dumps(counts, indent=1) + "\n")
             n_faults += len(faults)
-            rate = done / took
-            print(f"{name}: {done:,} executions, {rate:,.0f} a second, {len(faults)} faults")
+            rate = n_executions / seconds
+            print(
+                f"{name}: {n_executions:,} executions, {rate:,.0f} a second, {len(faults)} faults"
+            )
             print("".join(f"{fault}\n" for fault in faults[:5]), end="", flush=True)
-    total = sum(own["executions"] for of in counts.values() for own in of.values())
-    print(f"{total:,} executions in all")
+    names = {name for targets in counts.values() for name in targets}
+    print(f"{sum(n_executions_of(counts, name) for name in names):,} executions in all")
     return 1 if n_faults else 0
 
 

@@ -8,6 +8,7 @@ import pytest
 
 import bad_inputs
 import bad_options
+import bad_values
 import core_cells
 from matrices import MATRICES, sample_cells
 from sdnn.cli import main
@@ -39,8 +40,8 @@ def test_crashes_and_hangs_are_failed_cells(monkeypatch):
 
 def test_every_constructor_parameter_has_cells_of_the_matrix():
     cells = [name for name, _ in bad_inputs.constructor_cells("SDNNQLearning")]
-    for parameter in bad_inputs.parameters_of(bad_inputs.SDNNQLearning.__init__):
-        assert sum(f"({parameter}=" in name for name in cells) >= len(bad_inputs.BAD)
+    for parameter in bad_values.parameters_of(bad_inputs.SDNNQLearning.__init__):
+        assert sum(f"({parameter}=" in name for name in cells) >= len(bad_values.BAD)
 
 
 def test_every_command_has_bad_options_that_are_tested():

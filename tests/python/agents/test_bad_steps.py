@@ -4,7 +4,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from bad_inputs import BAD
+from bad_values import BAD
 from refusals import refuses
 from sdnn.agents import RBFQLearning, UnusableStepError, evaluate
 

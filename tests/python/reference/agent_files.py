@@ -1,7 +1,8 @@
 """Writes the files of tests/data, which C++ and Python must read alike.
 
-For each agent: a file, the steps that it takes when the file is loaded (observations, actions and
-so on), and the file after these steps. For trainings and estimators: a small file.
+For each agent NAME of `AGENTS`: the file NAME.safetensors, the steps that the agent takes after the
+file is loaded (NAME.json), and the file after these steps (NAME-after.safetensors). For trainings
+and estimators: a small file.
 """
 
 import json
@@ -28,11 +29,14 @@ from sdnn.agents import (
 from sdnn.approximators import FuzzyRulesConfig, LinearSDNNConfig, RBFNetworkConfig, SDNNCConfig
 
 FOLDER = Path(__file__).parents[2] / "data"
-OBSERVATIONS = gym.spaces.Box(
+COSINE_SINE_SPEED_OTHER = gym.spaces.Box(
     np.array([-1.0, -1.0, -8.0, -np.inf]), np.array([1.0, 1.0, 8.0, np.inf]), dtype=np.float64
 )
-GEARS = gym.spaces.Dict({"gear": gym.spaces.Discrete(3, start=1), "motion": OBSERVATIONS})
+GEAR_AND_MOTION = gym.spaces.Dict(
+    {"gear": gym.spaces.Discrete(3, start=1), "motion": COSINE_SINE_SPEED_OTHER}
+)
 TORQUE = gym.spaces.Box(-2.0, 3.0, (1,), dtype=np.float64)
+TWO_TORQUES = gym.spaces.Box(np.array([0.0, -1.0]), np.array([1.0, 1.0]), dtype=np.float64)
 SMALL = SDNNCConfig(
     n_pattern_units=12,
     n_anchor_patterns=4,
@@ -53,69 +57,60 @@ LEARNING = QLearningConfig(
 )
 N_STEPS = 40
 
-
-def agents():
-    """Yield names and agents, of all classes that both languages have."""
-    fuzzy = FuzzyQLearningConfig(trace_decay=0.7, n_greedy_steps=0, epsilon=0.3)
-    classes = {
-        "sdnn": SDNNQLearning,
-        "sdnn-vector": SDNNQLearning,
-        "sdnn-discrete": SDNNQLearning,
-        "sdnn-symbols": SDNNQLearning,
-        "sdnn-pairs": SDNNQLearning,
-        "sdnn-warm-up": SDNNQLearning,
-        "q-lambda": SDNNQLambda,
-        "q-lambda-vector": SDNNQLambda,
-        "rbf": RBFQLearning,
-        "fuzzy": FuzzyQLearning,
-        "fuzzy-vector": FuzzyQLearning,
-    }
-    two = gym.spaces.Box(np.array([0.0, -1.0]), np.array([1.0, 1.0]), dtype=np.float64)
-    spaces = {
-        "q-lambda-vector": two,
-        "sdnn-vector": two,
-        "fuzzy-vector": two,
-        "sdnn-discrete": gym.spaces.Discrete(3, start=4),
-    }
-    rules = {"approximator": FuzzyRulesConfig(n_sets=3, n_actions=4), "learning": fuzzy}
-    q_lambda = {
-        "approximator": LinearSDNNConfig(
-            n_pattern_units=20,
-            n_anchor_patterns=4,
-            n_interpolated=6,
-            n_actions=5,
-            averaging_interval=3,
-        ),
-        "learning": QLambdaConfig(epsilon=0.3, schedule_steps=50, max_action_repeat=6),
-    }
-    settings = {
-        "q-lambda": q_lambda | {"inputs": "relevant"},
-        "q-lambda-vector": q_lambda | {"inputs": "all"},
-        "rbf": {"approximator": RBFNetworkConfig(n_bases=3, n_actions=7), "learning": LEARNING},
-        "sdnn-pairs": {"approximator": replace(SMALL, max_pairs=3), "learning": LEARNING},
-        "fuzzy": rules,
-        "fuzzy-vector": rules,
-    }
-    for name, agent_class in classes.items():
-        has_symbols = name == "sdnn-symbols"
-        agent = agent_class(
-            GEARS if has_symbols else OBSERVATIONS,
-            spaces.get(name, TORQUE),
-            angle_pairs=[(3, 4)] if has_symbols else [(0, 1)],  # cosine and sine, after the gear
-            warm_up_steps=140 if name == "sdnn-warm-up" else 50,  # 140: not over in the file
-            seed=11,
-            **settings.get(name, {"approximator": SMALL, "learning": LEARNING}),
-        )
-        yield name, agent
+COMMON = {
+    "observation_space": COSINE_SINE_SPEED_OTHER,
+    "action_space": TORQUE,
+    "angle_pairs": [(0, 1)],
+    "warm_up_steps": 50,
+    "seed": 11,
+}
+SDNN = {"approximator": SMALL, "learning": LEARNING}
+Q_LAMBDA = {
+    "approximator": LinearSDNNConfig(
+        n_pattern_units=20,
+        n_anchor_patterns=4,
+        n_interpolated=6,
+        n_actions=5,
+        averaging_interval=3,
+    ),
+    "learning": QLambdaConfig(epsilon=0.3, schedule_steps=50, max_action_repeat=6),
+}
+RBF = {"approximator": RBFNetworkConfig(n_bases=3, n_actions=7), "learning": LEARNING}
+FUZZY = {
+    "approximator": FuzzyRulesConfig(n_sets=3, n_actions=4),
+    "learning": FuzzyQLearningConfig(trace_decay=0.7, n_greedy_steps=0, epsilon=0.3),
+}
+AGENTS = {
+    "sdnn": (SDNNQLearning, SDNN),
+    "sdnn-vector": (SDNNQLearning, SDNN | {"action_space": TWO_TORQUES}),
+    "sdnn-discrete": (SDNNQLearning, SDNN | {"action_space": gym.spaces.Discrete(3, start=4)}),
+    # The gear is flattened to three variables, before the cosine and the sine.
+    "sdnn-symbols": (
+        SDNNQLearning,
+        SDNN | {"observation_space": GEAR_AND_MOTION, "angle_pairs": [(3, 4)]},
+    ),
+    "sdnn-pairs": (SDNNQLearning, SDNN | {"approximator": replace(SMALL, max_pairs=3)}),
+    # Longer than the 120 steps before the file is written.
+    "sdnn-warm-up": (SDNNQLearning, SDNN | {"warm_up_steps": 140}),
+    "q-lambda": (SDNNQLambda, Q_LAMBDA | {"inputs": "relevant"}),
+    "q-lambda-vector": (SDNNQLambda, Q_LAMBDA | {"action_space": TWO_TORQUES, "inputs": "all"}),
+    "rbf": (RBFQLearning, RBF),
+    "fuzzy": (FuzzyQLearning, FUZZY),
+    "fuzzy-vector": (FuzzyQLearning, FUZZY | {"action_space": TWO_TORQUES}),
+}
+"""Classes that both languages have, and arguments beside `COMMON`, by the names of the files."""
 
 
 def record_steps(agent, rng, n_steps):
-    """Let the agent act and learn in a made-up task; return what happened in each step."""
+    """Let the agent act and learn in a made-up task; return a mapping for each step.
+
+    The task draws all numbers from ``rng``, so that actions have no consequences.
+    """
     steps = []
-    turn, speed, other = rng.uniform(-3, 3, 3)
+    angle, speed, other = rng.uniform(-3, 3, 3)
 
     def observe():
-        motion = [np.cos(turn), np.sin(turn), speed, other]
+        motion = [np.cos(angle), np.sin(angle), speed, other]
         if isinstance(agent.observation_space, gym.spaces.Box):
             return motion
         return {"gear": int(1 + 2 * abs(speed) / 8), "motion": motion}
@@ -127,7 +122,7 @@ def record_steps(agent, rng, n_steps):
             agent.begin_episode()
         action = agent.act(observation)
         greedy = agent.act(observation, explore=False)
-        turn, speed, other = turn + 0.2 * speed, rng.uniform(-8, 8), rng.normal()
+        angle, speed, other = angle + 0.2 * speed, rng.uniform(-8, 8), rng.normal()
         next_observation = observe()
         reward, terminated = float(rng.normal()), bool(rng.random() < 0.1)
         agent.learn(Transition(observation, action, reward, next_observation, terminated))
@@ -165,7 +160,8 @@ def write(folder):
 def write_agents(folder):
     """Write the files of agents and their steps."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name, agent in agents():
+    for name, (agent_class, arguments) in AGENTS.items():
+        agent = agent_class(**COMMON | arguments)
         rng = np.random.default_rng(5)
         record_steps(agent, rng, 120)
         agent.progress = 0.5

@@ -1,13 +1,11 @@
-"""A matrix of bad inputs, made from signatures and fields: a new parameter is covered by itself.
+"""Cells of bad inputs of agents, made from signatures and fields.
 
-A cell (a name, and a function that returns a fault) gives one bad value to one parameter. The call
-must refuse it by a typed error that names the parameter, and not change the agent; or work.
+See bad_values.py for what a cell checks. A new parameter gets cells by itself; a required one needs
+a good value in `good_arguments`. A refused value must not change the agent.
 """
 
-import contextlib
 import dataclasses
 import inspect
-import re
 import tempfile
 from functools import partial
 from pathlib import Path
@@ -16,6 +14,7 @@ import gymnasium as gym
 import numpy as np
 
 import sdnn.agents as agents
+from bad_values import BAD, EnoughError, bad_cells, judged, parameters_of
 from sdnn.agents import (
     FuzzyQLearning,
     FuzzyQLearningConfig,
@@ -29,75 +28,7 @@ from sdnn.agents import (
     load_agent,
 )
 from sdnn.approximators import FuzzyRulesConfig, LinearSDNNConfig, RBFNetworkConfig, SDNNCConfig
-from sdnn.support.arguments import shown
 from sdnn.support.files import read_file, write_file
-
-TYPED = (TypeError, ValueError, OverflowError, OSError)
-
-BAD = {
-    "NaN": lambda: np.nan,
-    "inf": lambda: np.inf,
-    "-inf": lambda: -np.inf,
-    "-1": lambda: -1,
-    "0": lambda: 0,
-    "0.5": lambda: 0.5,
-    "2**20": lambda: 2**20,
-    "2**31": lambda: 2**31,
-    "2**63": lambda: 2**63,
-    "-2**63": lambda: -(2**63),
-    "10**400": lambda: 10**400,
-    "1e308": lambda: 1e308,
-    "-1e308": lambda: -1e308,
-    "a text": lambda: "abc",
-    "a number as text": lambda: "1",
-    "an empty text": lambda: "",
-    "a zero byte": lambda: "a\0b",
-    "bytes": lambda: b"1",
-    "None": lambda: None,
-    "True": lambda: True,
-    "complex": lambda: 1 + 2j,
-    "object": object,
-    "empty list": lambda: [],
-    "empty tuple": lambda: (),
-    "empty dict": lambda: {},
-    "ragged list": lambda: [[1.0], [2.0, 3.0]],
-    "list of None": lambda: [None, None],
-    "list of texts": lambda: ["a", "b"],
-    "list of huge": lambda: [10**400, 10**400],
-    "generator": lambda: (number for number in (0.1, 0.2)),
-    "wrong shape": lambda: np.zeros((2, 3, 4)),
-    "wrong dtype": lambda: np.array([1j, 2j]),
-    "array of NaN": lambda: np.full(2, np.nan),
-    "array of inf": lambda: np.full(2, np.inf),
-    "array of 1e308": lambda: np.full(2, 1e308),
-    "array of objects": lambda: np.array([object(), object()]),
-    "a class": lambda: int,
-    "10**5000": lambda: 10**5000,
-    "a number as NumPy text": lambda: np.str_("1"),
-    "masked array": lambda: np.ma.masked_array([0.1, 0.2], [False, True]),
-    "datetime64": lambda: np.datetime64("2020-01-01", "D"),
-    "array of datetime64": lambda: np.array(["2020-01-01", "2020-01-02"], "M8[D]"),
-    "a column": lambda: np.zeros((2, 1)),
-    "a list in itself": lambda: endless(),
-    "lists 100,000 deep": lambda: deep(list),
-    "tuples 100,000 deep": lambda: deep(tuple),
-}
-
-
-def endless():
-    """Return a list that contains itself."""
-    items = []
-    items.append(items)
-    return items
-
-
-def deep(kind, levels=100_000):
-    """Return nested lists or tuples, deeper than Python's limit of recursion."""
-    nested = kind()
-    for _ in range(levels):
-        nested = kind([nested])
-    return nested
-
 
 SPACES = {
     "Text": lambda: gym.spaces.Text(3),
@@ -165,19 +96,23 @@ SETTINGS = {
         FuzzyQLearningConfig(trace_decay=0.5, n_greedy_steps=0),
     ),
 }
+"""Small approximators and rules of learning, by the class of agents."""
+
 CASES = {
     "": {},
     ", vector": {"action_space": TORQUES},
     ", warm-up": {"observation_space": UNBOUNDED, "warm_up_steps": 30},
 }
-KINDS = [kind.__name__ + case for kind in SETTINGS for case in CASES]
+AGENT_CASES = [agent_class.__name__ + case for agent_class in SETTINGS for case in CASES]
+"""Names of agents of all classes and cases, such as "SDNNQLambda, vector"."""
+
+"""Arguments of agents beside the usual ones, by the end of the name of an agent."""
 
 HERE = [0.1, 0.2]
-ENOUGH = 40
+"""A good observation."""
 
-
-class EnoughError(Exception):
-    """Ends a training that a bad value makes too long."""
+MOST_STEPS = 40
+"""Steps of an environment after which a training that a bad value makes long is ended."""
 
 
 class Slope(gym.Env):
@@ -203,17 +138,18 @@ class Slope(gym.Env):
         return at, float(-abs(at[0])), False, self._n >= 7, {}
 
 
-def make_agent(kind, **options):
-    """Return a small agent of one of `KINDS`, a class and a case such as "SDNNQLambda, vector"."""
-    name, comma, case = kind.partition(",")
-    cls = getattr(agents, name)
-    approximator, learning = SETTINGS[cls]
+def make_agent(agent_case, **options):
+    """Return a small agent with a name of `AGENT_CASES`; ``options`` are further arguments."""
+    name, comma, case = agent_case.partition(",")
+    agent_class = getattr(agents, name)
+    approximator, learning = SETTINGS[agent_class]
     settings = {"observation_space": PLANE, "action_space": TORQUE, "seed": 3}
     settings |= {"approximator": approximator, "learning": learning}
-    if cls is SDNNQLambda and "warm_up_steps" not in CASES[comma + case]:  # no warm-up by default
+    if (
+        agent_class is SDNNQLambda and "warm_up_steps" not in CASES[comma + case]
+    ):  # no warm-up by default
         settings |= {"inputs": "all", "angle_pairs": "none"}
-    agent = cls(**{**settings, **CASES[comma + case], **options})
-    return agent
+    return agent_class(**settings | CASES[comma + case] | options)
 
 
 def trained(agent, n_steps=7):
@@ -253,6 +189,7 @@ def agent_fault(agent):
 
 
 def sampled(space):
+    """Return a random element of a space."""
     try:
         with np.errstate(over="ignore"):
             return space.sample()
@@ -261,12 +198,14 @@ def sampled(space):
 
 
 def action_fault(agent, action):
+    """Return what is wrong with an action: NaN or infinite, or outside its space; or ""."""
     values = np.asarray(action, np.float64)
     is_in = agent.action_space.contains(action) or np.isscalar(action)
     return "" if np.isfinite(values).all() and is_in else f"chose {action!r}"
 
 
 def state_fault(agent):
+    """Return which array of an agent's state is not finite, or ""."""
     for name, array in agent.state().items():
         if name.startswith("warm_up."):  # observations, which may be infinite
             continue
@@ -278,8 +217,8 @@ def state_fault(agent):
 class ReusedAgent:
     """A trained agent that cells share until one of them is accepted, which may change it."""
 
-    def __init__(self, kind):
-        self._kind = kind
+    def __init__(self, agent_case):
+        self._agent_case = agent_case
         self.forget()
 
     def forget(self):
@@ -288,99 +227,13 @@ class ReusedAgent:
     @property
     def agent(self):
         if self._agent is None:
-            self._agent = trained(make_agent(self._kind))
+            self._agent = trained(make_agent(self._agent_case))
             self._before = memory(self._agent)
         return self._agent
 
     @property
     def is_unchanged(self):
         return memory(self._agent) == self._before
-
-
-def judged(parameter, call, reused=None, value=None):
-    """Run ``call``, which returns the fault of an accepted value or ""; return the cell's fault.
-
-    A refusal must name the parameter, show ``value()``, and leave the agent ``reused`` unchanged.
-    """
-    try:
-        fault = call() or ""
-    except EnoughError:
-        fault = ""
-    except TYPED as error:
-        if fault := message_fault(error, parameter, value):
-            return fault
-        if reused is None or reused.is_unchanged:
-            return ""
-        fault = f"refused, but changed the agent: {str(error)[:100]}"
-    except Exception as error:
-        return f"raised {type(error).__name__}: {str(error)[:200]}"
-    if reused is not None:
-        reused.forget()
-    return fault
-
-
-def message_fault(error, parameter, value):
-    """Return what is wrong with the words of a refusal, or ""."""
-    message = str(error)
-    told = f"{type(error).__name__}: {message[:200]}"
-    if "incompatible" in message or "not supported" in message:
-        return f"said {told}"
-    if isinstance(error, OSError):
-        return ""
-    if not re.search(rf"\b{parameter}\b", message):
-        return f"did not name {parameter}: {told}"
-    is_told = value is None or is_shown(value(), message)
-    return "" if is_told else f"did not show the value: {told}"
-
-
-def is_shown(value, message):
-    """Return whether a message has a value, or after "got" its type, its shape or its size."""
-    if shown(value) in message:
-        return True
-    try:
-        repr(value)
-    except (RecursionError, ValueError):  # of lists 100,000 deep, of 5,000 digits
-        got = message.partition("got ")[2]
-        return any(word in got for word in (type(value).__name__, "more"))
-    message = re.sub(r"0x[0-9a-f]+", "0x", message.lower())
-    if isinstance(value, gym.Space) or "bytes" in message:  # its consequence is named instead
-        return True
-    if message.endswith("must be given"):  # the missing part of it has no value
-        return True
-    items = [value, *(value if isinstance(value, str | bytes | list | np.ndarray) else ())]
-    forms = {form for item in items for form in (repr(item), str(item))}
-    forms |= {f"{item:g}" for item in items if isinstance(item, int | float) and item < 10**300}
-    forms |= {str(tuple(value))} if isinstance(value, list | dict) else set()
-    with contextlib.suppress(TypeError, ValueError, OverflowError, RuntimeWarning):
-        forms |= {str(np.asarray(value, float).tolist())}
-    if any(re.sub(r"0x[0-9a-f]+", "0x", form.lower()) in message for form in forms if form):
-        return True
-    kinds = [name for item in items for name in (type(item).__name__, *_shape_and_size(item))]
-    got = message.partition("got ")[2]
-    words = [*kinds, "more", "others", "a table"]
-    return "too large" in message or any(word in got for word in words)
-
-
-def _shape_and_size(value):
-    try:
-        return str(np.shape(value)), str(np.size(value))
-    except ValueError:  # ragged
-        return ()
-
-
-def parameters_of(function):
-    parameters = inspect.signature(function).parameters.values()
-    listed = [
-        parameter.name for parameter in parameters if parameter.kind is not parameter.VAR_KEYWORD
-    ]
-    return [name for name in listed if name not in ("self", "cls")]
-
-
-def bad_cells(label, parameters, cell, values=BAD):
-    """Yield cells for all bad values ``value()``; ``cell(parameter, value)`` is their function."""
-    for parameter in parameters:
-        for word, value in values.items():
-            yield label.format(f"{parameter}={word}"), cell(parameter, value)
 
 
 # The rows of the matrix: functions that yield cells, each after functions that make their run().
@@ -411,17 +264,17 @@ def setting_cells(name):
             yield from bad_cells(f"{name}{case}: {part}.{{}}", fields, cell)
 
 
-def _setting_cell(kind, part, settings, field, value):
+def _setting_cell(agent_case, part, settings, field, value):
     def call():
         changed = dataclasses.replace(settings, **{field: value()})
-        return agent_fault(make_agent(kind, **{part: changed}))
+        return agent_fault(make_agent(agent_case, **{part: changed}))
 
     return lambda: judged(field, call, value=value)
 
 
-def transition_cells(kind):
-    cell = partial(_transition_cell, ReusedAgent(kind))
-    return bad_cells(f"{kind}.learn: {{}}", Transition._fields, cell)
+def transition_cells(agent_case):
+    cell = partial(_transition_cell, ReusedAgent(agent_case))
+    return bad_cells(f"{agent_case}.learn: {{}}", Transition._fields, cell)
 
 
 def _transition_cell(reused, parameter, value):
@@ -438,13 +291,17 @@ def _transition_cell(reused, parameter, value):
     return run
 
 
-def method_cells(kind):
-    """Every public method and settable property of an agent."""
-    reused = ReusedAgent(kind)
+def method_cells(agent_case):
+    """Yield cells of every public method and settable property of an agent."""
+    reused = ReusedAgent(agent_case)
     for name, method in inspect.getmembers(type(reused.agent)):
         if name.startswith("_") or name == "rebuild":  # rebuild: see the cells of files
             continue
-        if kind != KINDS[0] and name in ("train", "save", "load"):  # equal for all kinds
+        if agent_case != AGENT_CASES[0] and name in (
+            "train",
+            "save",
+            "load",
+        ):  # equal for all kinds
             continue
         if isinstance(method, property) and method.fset is not None:
             parameters = [name]
@@ -452,34 +309,34 @@ def method_cells(kind):
             parameters = parameters_of(method)
         else:
             continue
-        cell = partial(_method_cell, reused, kind, name, parameters)
-        yield from bad_cells(f"{kind}.{name}: {{}}", parameters, cell)
+        cell = partial(_method_cell, reused, agent_case, name, parameters)
+        yield from bad_cells(f"{agent_case}.{name}: {{}}", parameters, cell)
 
 
 READERS = ("q_values", "value", "rule_values")
 
 
-def _method_cell(reused, kind, name, parameters, parameter, value):
+def _method_cell(reused, agent_case, name, parameters, parameter, value):
     def run():
         agent = reused.agent
-        if ", warm-up" in kind and (name in READERS or name.startswith("plot_")):
+        if ", warm-up" in agent_case and (name in READERS or name.startswith("plot_")):
             return ""  # an agent that is warming up has no values
-        given = arguments(agent, parameters) | {parameter: value()}
+        arguments = good_arguments(agent, parameters) | {parameter: value()}
 
         def call():
             if isinstance(getattr(type(agent), name), property):
-                setattr(agent, name, given[parameter])
+                setattr(agent, name, arguments[parameter])
                 return agent_fault(agent)
-            return result_fault(agent, getattr(agent, name)(**given), given)
+            return result_fault(agent, getattr(agent, name)(**arguments), arguments)
 
         return judged(parameter, call, reused, value)
 
     return run
 
 
-def arguments(agent, parameters):
+def good_arguments(agent, parameters):
     """Return good arguments for these parameters; a new required parameter needs one here."""
-    env = Slope(agent.action_space, ENOUGH)
+    env = Slope(agent.action_space, MOST_STEPS)
     path = Path("agent").absolute()
     if "path" in parameters:
         agent.save(path)
@@ -515,7 +372,7 @@ def arguments(agent, parameters):
         "limit_bootstraps": True,
         "options": None,
         "reset_options": None,
-        "evaluation_env": Slope(agent.action_space, ENOUGH),
+        "evaluation_env": Slope(agent.action_space, MOST_STEPS),
         "evaluation_episodes": 1,
         "every": 3,
         "mean_return": 5.0,
@@ -527,23 +384,23 @@ def arguments(agent, parameters):
     return {name: good[name] for name in parameters}
 
 
-def result_fault(agent, result, given):
-    """Return what is wrong with the result of a method, or ""."""
+def result_fault(agent, result, arguments):
+    """Return what is wrong with the result of an agent's method, or ""."""
     if isinstance(result, agents.Agent):
         return agent_fault(result)
-    if "observation" in given and "explore" in given:
+    if "observation" in arguments and "explore" in arguments:  # act
         return action_fault(agent, result)
     if isinstance(result, agents.TrainingResult):
         return state_fault(agent) or ("" if np.isfinite(result.returns).all() else "returns")
-    is_observation = np.array_equal(result, given.get("observation"))  # which may be NaN
+    is_observation = np.array_equal(result, arguments.get("observation"))  # which may be NaN
     if isinstance(result, float | np.ndarray) and not is_observation:
         return "" if np.isfinite(result).all() else f"gave {result}"
     return state_fault(agent)
 
 
 def loop_cells():
-    """Training, its loading, evaluate, load_agent and the callbacks."""
-    kind = "SDNNQLearning"
+    """Yield cells of Training, its loading and saving, evaluate, load_agent and callbacks."""
+    agent_case = "SDNNQLearning"
     callables = {
         "evaluate": agents.evaluate,
         "load_agent": agents.load_agent,
@@ -556,40 +413,42 @@ def loop_cells():
     }
     for name, function in callables.items():
         parameters = parameters_of(function)
-        cell = partial(_loop_cell, kind, name, function, parameters)
+        cell = partial(_loop_cell, agent_case, name, function, parameters)
         yield from bad_cells(f"{name}({{}})", parameters, cell)
 
 
-def _loop_cell(kind, name, function, parameters, parameter, value):
+def _loop_cell(agent_case, name, function, parameters, parameter, value):
     def run():
-        reused = ReusedAgent(kind)
+        reused = ReusedAgent(agent_case)
         agent = reused.agent
-        good = arguments(agent, parameters)
-        env, other_env = (Slope(agent.action_space) for _ in range(2))
-        evaluations = {"evaluate_every": 5, "evaluation_env": other_env, "evaluation_episodes": 1}
-        if name != "StopTrainingOnRewardThreshold":  # which compares evaluations
-            evaluations = {}
+        good = good_arguments(agent, parameters)
+        env = Slope(agent.action_space)
+        evaluations = {}
+        if name == "StopTrainingOnRewardThreshold":  # compares evaluations
+            evaluation_env = Slope(agent.action_space)
+            evaluations = {"evaluate_every": 5, "evaluation_env": evaluation_env}
+            evaluations["evaluation_episodes"] = 1
         training = Training(agent, env, steps=5, seed=3, **evaluations)
         if name == "evaluate":
             good["episodes"] = 2
-        if name.startswith("Training."):
+        if name in ("Training.load", "Training.save"):
             training.run()
         if name == "Training.load":
             training.save(good["path"])
             good["steps"] = 9
-        given = good | {parameter: value()}
+        arguments = good | {parameter: value()}
 
         def call():
             if name == "Training.save":
-                training.save(**given)
+                training.save(**arguments)
                 return ""
-            made = function(**given)
-            if isinstance(made, Training):
-                return "" if made.run().n_steps > 0 else "learned nothing"
-            if isinstance(made, agents.Evaluation):
-                return "" if np.isfinite(made.returns).all() else "returns"
-            if isinstance(made, agents.Callback):
-                training.callbacks = (made,)
+            result = function(**arguments)
+            if isinstance(result, Training):
+                return "" if result.run().n_steps > 0 else "learned nothing"
+            if isinstance(result, agents.Evaluation):
+                return "" if np.isfinite(result.returns).all() else "returns"
+            if isinstance(result, agents.Callback):
+                training.callbacks = (result,)
                 training.run()
             return ""
 
@@ -598,9 +457,9 @@ def _loop_cell(kind, name, function, parameters, parameter, value):
     return run
 
 
-def file_cells(kind):
-    """Every value of a file's description and every array, damaged."""
-    agent = trained(make_agent(kind))
+def file_cells(agent_case):
+    """Yield cells of a training's file with a damaged value of its description or array."""
+    agent = trained(make_agent(agent_case))
     env = Slope(agent.action_space)
     training = Training(agent, env, steps=45, seed=3)
     training.run()
@@ -609,37 +468,42 @@ def file_cells(kind):
         path = Path(folder) / "checkpoint"
         training.save(path)
         description, arrays = read_file(path, "training")
-    for place in leaves(description):
-        for word, value in {"nothing": ..., **JSON}.items():
-            changed = replaced(description, place, value)
-            name = ".".join(map(str, place))
-            yield f"{kind}'s file: {name}={word}", _file_cell(changed, arrays, kind)
+    for keys in leaves(description):
+        for value_name, value in {"nothing": ..., **JSON}.items():
+            name = ".".join(map(str, keys))
+            cell = _file_cell(replaced(description, keys, value), arrays, agent_case)
+            yield f"{agent_case}'s file: {name}={value_name}", cell
     for name, array in arrays.items():
+        # No array of that name, bytes instead of numbers, another length, and other values.
         damages = {"nothing": None, "texts": np.zeros(3, np.uint8), "longer": np.zeros(7)}
         damages["-1"] = np.full_like(array, -1 if array.dtype.kind != "u" else 255)
         if array.dtype.kind == "f":
             damages |= {"NaN": np.full_like(array, np.nan), "inf": np.full_like(array, np.inf)}
-        for word, damage in damages.items():
-            changed = {n: a for n, a in arrays.items() if n != name}
-            if damage is not None:
-                changed[name] = damage
-            yield f"{kind}'s file: {name} of {word}", _file_cell(description, changed, kind)
+        for damage_name, damage in damages.items():
+            changed = arrays | {name: damage}
+            if damage is None:
+                del changed[name]
+            cell = _file_cell(description, changed, agent_case)
+            yield f"{agent_case}'s file: {name} of {damage_name}", cell
 
 
-def leaves(data, place=()):
-    """Yield the keys, as tuples, of all tables, lists and values of a file's description."""
-    if place:
-        yield place
+def leaves(data, keys=()):
+    """Yield the keys, as tuples, of all tables, lists and values of a file's description.
+
+    Items of lists of more than four items, which are numbers, are left out.
+    """
+    if keys:
+        yield keys
     items = data.items() if isinstance(data, dict) else ()
     if isinstance(data, list) and len(data) <= 4:
         items = enumerate(data)
     for key, item in items:
-        yield from leaves(item, (*place, key))
+        yield from leaves(item, (*keys, key))
 
 
-def replaced(data, place, value):
-    """Return a copy of the data with another value at a tuple of keys; without it if it is ... ."""
-    key, *rest = place
+def replaced(data, keys, value):
+    """Return a copy of the data with another value at a tuple of keys; ``...`` removes it."""
+    key, *rest = keys
     changed = dict(data) if isinstance(data, dict) else list(data)
     if rest:
         changed[key] = replaced(data[key], rest, value)
@@ -650,20 +514,19 @@ def replaced(data, place, value):
     return changed
 
 
-def _file_cell(description, arrays, kind):
+def _file_cell(description, arrays, agent_case):
     def run():
         path = Path("damaged").absolute()
         write_file(path, "training", arrays, description)
-        for load in (load_agent, lambda path: _trained(path, kind)):
+        for load in (load_agent, partial(_load_and_train, agent_case=agent_case)):
             try:
                 fault = agent_fault(load(path))
-            except EnoughError:
+            except (EnoughError, OverflowError):  # the file had the largest possible values
                 continue
-            except OverflowError:
-                continue  # values as large as can be were in the file
             except ValueError as error:
-                named = (str(path), "env must", "repeat_episodes must")
-                fault = "" if any(name in str(error) for name in named) else str(error)
+                subjects = (str(path), "env must", "repeat_episodes must")
+                is_clear = any(subject in str(error) for subject in subjects)
+                fault = "" if is_clear else str(error)
             if fault:
                 return fault
         return ""
@@ -671,7 +534,7 @@ def _file_cell(description, arrays, kind):
     return run
 
 
-def _trained(path, kind):
-    training = Training.load(path, Slope(make_agent(kind).action_space, 2 * ENOUGH))
+def _load_and_train(path, agent_case):
+    training = Training.load(path, Slope(make_agent(agent_case).action_space, 2 * MOST_STEPS))
     training.run()
     return training.agent

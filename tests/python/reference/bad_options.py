@@ -54,15 +54,15 @@ COMMANDS = {
 """Good arguments and options, with which the commands work and end soon."""
 
 LEFT_OUT = {"bench"}
-"""Measures for a minute whatever its options, which are flags."""
+"""Commands without cells: all options of `bench` are flags, and it measures for a minute."""
 
 
 @functools.cache
 def run_folder():
-    """Return the folder of a finished run, which is trained once in each process."""
+    """Train a small agent, once in each process; return the folder of the finished run."""
     run = os.path.join(tempfile.mkdtemp(), "run")
     settings = ["n_pattern_units=20", "n_hidden_units=60", "n_active_units=20"]
-    options = [word for setting in settings for word in ("--set", f"approximator.{setting}")]
+    options = [f"--set=approximator.{setting}" for setting in settings]
     arguments = ["train", "MountainCar-v0", "--agent", "sdnn-c", "--steps", "60", *options]
     arguments += ["--evaluate-every", "60"]
     result = CliRunner().invoke(main, [*arguments, "--evaluation-episodes", "1", "--out", run])
@@ -77,16 +77,17 @@ def parameters_of(command):
 
 
 def command_cells(command):
+    """Yield cells of every option and argument of a command; a flag gets the value 5 only."""
     for parameter in parameters_of(command):
         texts = {"a value": "5"} if getattr(parameter, "is_flag", False) else TEXTS
-        for word, text in texts.items():
+        for title, text in texts.items():
             name = parameter.opts[-1]
-            yield f"sdnn {command} {name} {word}", _cell(command, parameter, text)
+            yield f"sdnn {command} {name} {title}", _cell(command, parameter, text)
 
 
 def arguments_of(command, parameter, text):
     """Return the good arguments and options, with the text as the value of one of them."""
-    arguments, options = (list(words) for words in COMMANDS[command])
+    arguments, options = map(list, COMMANDS[command])
     if isinstance(parameter, Argument):
         positional = [other for other in parameters_of(command) if isinstance(other, Argument)]
         arguments[positional.index(parameter)] = text

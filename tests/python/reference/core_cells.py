@@ -15,19 +15,22 @@ from functools import partial
 import numpy as np
 
 import sdnn._core as core
-from bad_inputs import TYPED, bad_cells
+from bad_values import TYPED, bad_cells
 
 CLASSES = [value for value in vars(core).values() if type(value).__name__ == "pybind11_type"]
 """All classes but enumerations, which are Python's own."""
 
 NOT_MADE = "__init__() was not called"
+"""A part of the message of an object that ``cls.__new__`` has made without ``__init__``."""
 
 
-def patterns(n_bins=12, n_units=20):
-    return core.random_inverse_patterns(n_units, n_bins, 2, 1)
+def patterns():
+    """Return patterns of 20 units for 12 bins."""
+    return core.random_inverse_patterns(n_units=20, n_bins=12, n_flipped=2, seed=1)
 
 
 def code():
+    """Return the code of two inputs, each desensitized by the other."""
     return core.SelectiveDesensitization([patterns()] * 2, [patterns()] * 2, [[0, 1], [1, 0]])
 
 
@@ -39,10 +42,6 @@ def network_config(**sizes):
 def linear_config(**sizes):
     small = {"n_inputs": 2, "n_pattern_units": 20, "averaging_interval": 2}
     return core.LinearSDNNConfig(**{**small, **sizes})
-
-
-def learning(kind=core.QLearningConfig):
-    return kind(n_greedy_steps=0)
 
 
 def trial_settings():
@@ -57,6 +56,7 @@ def trial_settings():
 
 
 BINS = [[0, 1], [2, 3], [4, 5]]
+"""The bins of three samples of two inputs."""
 
 GOOD = {
     "SelectiveDesensitization": lambda: {
@@ -108,13 +108,16 @@ GOOD = {
         "n_actions": [3, 4],
     },
     "Controller": lambda: {
-        "approximator": core.RBFNetworkConfig(), "learning": learning(), "seed": 1,
+        "approximator": core.RBFNetworkConfig(),
+        "learning": core.QLearningConfig(n_greedy_steps=0),
+        "seed": 1,
         "observation": core.ObservationConfig(low=[0.0], high=[1.0]),
         "action": core.ActionConfig(low=[0.0], high=[1.0]),
     },
     "AcrobotTrial": lambda: {"approximator": network_config(n_inputs=4), **trial_settings()},
     "PlainRBFQLearning": lambda: {
-        "approximator": core.RBFNetworkConfig(), "learning": learning(), "seed": 1
+        "approximator": core.RBFNetworkConfig(), "learning": core.QLearningConfig(n_greedy_steps=0),
+        "seed": 1,
     },
     "DenseProduct": lambda: {"n_rows": 3, "n_columns": 4, "seed": 1},
     "NetworkParts": lambda: {"network": core.SDNNC(network_config(), 1), "seed": 1},
@@ -134,7 +137,7 @@ GOOD = {
     },
     "n_units_for": lambda: {"scheme": "one_vs_one", "n_classes": 4},
 }  # fmt: skip
-"""Good arguments of everything that takes some; what is missing here fails the test."""
+"""Good arguments of each class and function of the core; a new one needs an entry."""
 
 METHODS = {
     ("SelectiveDesensitization", "transform"): {"bins": BINS},
@@ -202,11 +205,15 @@ METHODS = {
 }  # fmt: skip
 
 
+"""Good arguments of methods, by the names of class and method."""
+
+
 def valid_object(name):
     return getattr(core, name)(**GOOD[name]())
 
 
 def never_made_cells():
+    """Yield cells that use objects without ``__init__``: as self, and as arguments of the core."""
     for cls in CLASSES:
         for name, member in inspect.getmembers(cls):
             if isinstance(member, property):
@@ -280,6 +287,7 @@ def _subclass_cell(cls):
 
 
 def argument_cells():
+    """Yield cells of bad values of all arguments of classes, functions and methods of the core."""
     for name in GOOD:
         yield from bad_cells(f"{name}({{}})", GOOD[name](), partial(_argument_cell, name))
     for (name, method), good in METHODS.items():

@@ -1,4 +1,8 @@
-"""Prints the type stub of the compiled core: python tests/python/reference/core_stub.py."""
+"""Prints the type stub of the compiled core: python tests/python/reference/core_stub.py.
+
+pybind11-stubgen writes the stub. Its types of configurations, constructors and enumerations are
+replaced by narrower ones, and what differs from run to run is removed.
+"""
 
 from __future__ import annotations
 
@@ -11,20 +15,22 @@ from pathlib import Path
 import sdnn._core
 
 
-def _typed_config(found: re.Match[str]) -> str:
-    """Return the stub of a configuration with types, from the attribute ``fields`` of its class."""
-    text = found[0]
-    hints = {name: hint for name, hint, *_ in getattr(sdnn._core, found[1]).fields}
+def _typed_config(match: re.Match[str]) -> str:
+    """Return the stub of a configuration with types, from the attribute ``fields`` of its class.
+
+    The match is the stub of the class as the tool writes it; its group is the name of the class.
+    """
+    text, class_name = match[0], match[1]
+    hints = {name: hint for name, hint, *_ in getattr(sdnn._core, class_name).fields}
     for name, hint in hints.items():
         text = re.sub(rf"(    def {name}\(self\)) -> .*:", rf"\1 -> {hint}:", text)
-    sequence = ("tuple[", "collections.abc.Sequence["), (", ...]", "]")
-    given = []
-    for name, hint in hints.items():
-        for old, new in sequence:
-            hint = hint.replace(old, new)
-        given.append(f"{name}: {hint} = ...")
-    text = re.sub(r"def __init__\(self, .*\)", f"def __init__(self, *, {', '.join(given)})", text)
-    text = text.replace("**kwargs) -> " + found[1], "**changes: typing.Any) -> " + found[1])
+    parameters = []
+    for name, hint in hints.items():  # a tuple may be given as any sequence
+        hint = hint.replace("tuple[", "collections.abc.Sequence[").replace(", ...]", "]")
+        parameters.append(f"{name}: {hint} = ...")
+    signature = f"def __init__(self, *, {', '.join(parameters)})"
+    text = re.sub(r"def __init__\(self, .*\)", signature, text)
+    text = text.replace(f"**kwargs) -> {class_name}", f"**changes: typing.Any) -> {class_name}")
     text = re.sub(r"    fields: .*", "    fields: typing.ClassVar[tuple[typing.Any, ...]]", text)
     fields = "    __dataclass_fields__: typing.ClassVar[dict[str, typing.Any]]\n"
     return text.replace("    fields: ", fields + "    fields: ", 1)

@@ -36,6 +36,7 @@ from sdnn.training.files import read_statistics
 
 MOST_SECONDS = 5.0
 MOST_BYTES = 2**28
+"""Limits, chosen, of the processor time and memory that a reader needs for a file."""
 
 
 def make_env():
@@ -106,12 +107,12 @@ def good_file(name):
     return READERS[name].good()[0]
 
 
-def bind(path):
+def make_socket(path):
     with socket.socket(socket.AF_UNIX) as server:
-        server.bind(path.name)  # a long path would not fit
+        server.bind(path.name)  # in the current folder; a long path would not fit
 
 
-def sparse(path):
+def make_sparse_file(path):
     with path.open("wb") as file:
         file.truncate(2**40)
 
@@ -119,12 +120,12 @@ def sparse(path):
 SPECIAL = {
     "pipe": os.mkfifo,
     "folder": Path.mkdir,
-    "socket": bind,
+    "socket": make_socket,
     "link to a device": lambda path: path.symlink_to("/dev/zero"),
     "link to a terminal": lambda path: path.symlink_to("/dev/tty"),
-    "a terabyte": sparse,
+    "a terabyte": make_sparse_file,
 }
-"""Files of sizes that cannot fit: always refused."""
+"""Functions that make what no reader can accept: no regular file, or far too much of it."""
 
 MIB = 2**20
 HEADERS = (b"[study]\n", b"[base]\n", b"[base.learning]\n", b"[axes]\n", b"[cases]\n", b"")
@@ -170,27 +171,24 @@ CONTENTS = {
 def damages(name):
     """Yield names of damages, functions that do them to a path, and whether they are refused."""
     good = good_file(name)
-    is_checked = name in CHECKED
-    for word, make in SPECIAL.items():
-        yield word, make, True
-    for word, content in CONTENTS.items():
-        yield word, functools.partial(Path.write_bytes, data=content), is_checked
-    for word, content in changed(name, good):
-        yield word, functools.partial(Path.write_bytes, data=content), False
+    for title, make in SPECIAL.items():
+        yield title, make, True
+    for title, content in changed(name, good):
+        yield title, functools.partial(Path.write_bytes, data=content), False
+    contents = {**CONTENTS, "more": good + b"\0", "twice": good + good}
     rng = np.random.default_rng(1)
     for number in range(30):
-        cut = good[: int(rng.integers(len(good)))]
-        yield f"cut {number}", functools.partial(Path.write_bytes, data=cut), is_checked
+        contents[f"cut {number}"] = good[: int(rng.integers(len(good)))]
     for number in range(60):
         flipped = bytearray(good)
         flipped[int(rng.integers(len(good)))] ^= 1 << int(rng.integers(8))
-        yield f"bit {number}", functools.partial(Path.write_bytes, data=bytes(flipped)), is_checked
-    for word, content in {"more": good + b"\0", "twice": good + good}.items():
-        yield word, functools.partial(Path.write_bytes, data=content), is_checked
+        contents[f"bit {number}"] = bytes(flipped)
+    for title, content in contents.items():
+        yield title, functools.partial(Path.write_bytes, data=content), name in CHECKED
 
 
 def changed(name, good):
-    """Yield names and contents of files that are made for this reader."""
+    """Yield titles and contents of damaged files that only this reader can get."""
     if name.startswith("libsdnn"):
         text = good if name == "libsdnn parameters" else parameters_of(good)
         rest = b"" if name == "libsdnn parameters" else good[4 + len(text) :]
@@ -207,30 +205,31 @@ def changed(name, good):
                 length = b"" if not rest else len(other).to_bytes(4, "little")
                 yield new.decode(), length + other + rest
     if name in CHECKED:
-        yield from of_other_types(good)
+        yield from with_other_types(good)
 
 
 OTHER_TYPES = {1: ("F8_E4M3", "F8_E5M2", "BOOL"), 2: ("BF16", "F16", "U16"), 4: ("U32",),
                8: ("C64", "U64")}  # fmt: skip
+"""Types of safetensors that the package does not write, by the bytes of a number."""
 
 
-def of_other_types(good):
+def with_other_types(good):
     """Yield names and files in which one array has another type, with the right checksum."""
     length = int.from_bytes(good[:8], "little")
     header, data = json.loads(good[8 : 8 + length]), good[8 + length :]
     sizes = {"I8": 1, "U8": 1, "I16": 2, "I32": 4, "F32": 4, "I64": 8, "U64": 8, "F64": 8}
     for name in [name for name in header if name != "__metadata__"]:
-        for kind in OTHER_TYPES[sizes[header[name]["dtype"]]]:
-            other = header | {name: header[name] | {"dtype": kind}}
-            text = json.dumps(other, separators=(",", ":")).encode()
-            text += b" " * (-len(text) % 8)
-            yield f"{name} of {kind}", with_checksum(len(text).to_bytes(8, "little") + text + data)
+        for dtype in OTHER_TYPES[sizes[header[name]["dtype"]]]:
+            changed_header = header | {name: header[name] | {"dtype": dtype}}
+            text = json.dumps(changed_header, separators=(",", ":")).encode()
+            text += b" " * (-len(text) % 8)  # arrays begin at a multiple of 8 bytes
+            yield f"{name} of {dtype}", with_checksum(len(text).to_bytes(8, "little") + text + data)
 
 
 def damage_cells(name):
     """Yield a cell for every damage of a reader's file."""
-    for word, damage, is_refused in damages(name):
-        yield f"{name}, {word}", functools.partial(read_damaged, name, damage, is_refused)
+    for title, damage, is_refused in damages(name):
+        yield f"{name}, {title}", functools.partial(read_damaged, name, damage, is_refused)
 
 
 def read_damaged(name, damage, is_refused):
@@ -284,11 +283,11 @@ def header_cells(name, number):
     path.write_bytes(reader.good()[number])
     description, arrays = read_file(path, name)
     path.unlink()
-    for place in leaves(description):
-        for word, value in VALUES.items():
-            other = replaced(description, place, value)
-            label = f"{name} {number}: {'.'.join(map(str, place))} = {word}"
-            yield label, functools.partial(_header_cell, name, arrays, other)
+    for keys in leaves(description):
+        for title, value in VALUES.items():
+            changed_description = replaced(description, keys, value)
+            label = f"{name} {number}: {'.'.join(map(str, keys))} = {title}"
+            yield label, functools.partial(_header_cell, name, arrays, changed_description)
 
 
 def _header_cell(name, arrays, description):

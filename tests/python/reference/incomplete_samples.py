@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from sklearn.base import clone
 
-from bad_inputs import judged
+from bad_values import judged
 from public_cells import ESTIMATORS
 from sdnn.coding import RandomInverse, WithMissing, coding_named
 from sdnn.estimators import SDNNClassifier, SDNNKernelClassifier, SDNNRegressor

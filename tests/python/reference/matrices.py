@@ -14,7 +14,7 @@ import logged_data
 import public_cells
 import random_lives
 
-AGENTS = [kind.__name__ for kind in bad_inputs.SETTINGS]
+AGENTS = [agent_class.__name__ for agent_class in bad_inputs.SETTINGS]
 N_MUTATIONS = 300
 """Mutations of each kind of file."""
 
@@ -22,9 +22,9 @@ MATRICES = {
     "agents": [
         *((bad_inputs.constructor_cells, name) for name in AGENTS),
         *((bad_inputs.setting_cells, name) for name in AGENTS),
-        *((bad_inputs.transition_cells, kind) for kind in bad_inputs.KINDS),
-        *((bad_inputs.method_cells, kind) for kind in bad_inputs.KINDS),
-        *((bad_inputs.file_cells, kind) for kind in AGENTS),
+        *((bad_inputs.transition_cells, case) for case in bad_inputs.AGENT_CASES),
+        *((bad_inputs.method_cells, case) for case in bad_inputs.AGENT_CASES),
+        *((bad_inputs.file_cells, name) for name in AGENTS),
         (bad_inputs.loop_cells,),
         (random_lives.single_input_cells,),
         (logged_data.log_cells,),

@@ -10,7 +10,7 @@ import gymnasium as gym
 import numpy as np
 
 import core_cells
-from bad_inputs import BAD, bad_cells, judged, parameters_of
+from bad_values import BAD, bad_cells, judged, parameters_of
 from sdnn.agents import SDNNQLambda
 from sdnn.coding import (
     Anchor,
@@ -53,25 +53,29 @@ ESTIMATORS = {
     SDNNKernelRidge: (NUMBERS, {"degree": 1}),
     SDNNKernelClassifier: (LABELS, {"degree": 1}),
 }
-"""Targets, and parameters with which they are quick."""
+"""Targets, and parameters with which a fit is quick, by the class of estimator."""
 
 
 LONG_WORK = {
-    (parameter, word)
+    (parameter, value_name)
     for parameter in ("max_iter", "n_pattern_units", "n_output_units")
-    for word in ("2**20", "2**31", "2**63")
+    for value_name in ("2**20", "2**31", "2**63")
 }
 """Values that are accepted, but take too long."""
 
 NOT_NAMED = {("random_state", "list of huge")}
-"""Refused by NumPy in a message of the whole value."""
+"""Values that NumPy refuses by a message that does not name the parameter."""
 
 
 def estimator_cells():
+    """Yield cells of the parameters of estimators, and of their data."""
     for cls in ESTIMATORS:
         for parameter in parameters_of(cls.__init__):
-            left_out = {word for name, word in LONG_WORK | NOT_NAMED if name == parameter}
-            values = {word: value for word, value in BAD.items() if word not in left_out}
+            values = {
+                value_name: value
+                for value_name, value in BAD.items()
+                if (parameter, value_name) not in LONG_WORK | NOT_NAMED
+            }
             cell = partial(_estimator_cell, cls)
             yield from bad_cells(f"{cls.__name__}({{}})", [parameter], cell, values)
         yield from bad_cells(f"{cls.__name__}.fit({{}})", ["X", "y"], partial(_data_cell, cls))
@@ -90,8 +94,8 @@ def _estimator_cell(cls, parameter, value):
 def _data_cell(cls, parameter, value):
     def call():
         targets, small = ESTIMATORS[cls]
-        given = {"X": SAMPLES, "y": targets, parameter: value()}
-        return _prediction_fault(cls(**small).fit(**given))
+        arguments = {"X": SAMPLES, "y": targets, parameter: value()}
+        return _prediction_fault(cls(**small).fit(**arguments))
 
     return lambda: _without_name(call)
 
@@ -114,8 +118,8 @@ def _named_loosely(parameter, call, value):
     fault = judged(parameter, call, value=value)
     if "while getting the repr" in fault or "Exceeds the limit" in fault:
         return ""  # scikit-learn's message has the value
-    words = {"coding": "coding|columns|feature", "pairs": "pair|feature", "random_state": "[Ss]eed"}
-    is_named = re.search(words.get(parameter, parameter), fault.partition(":")[2])
+    names = {"coding": "coding|columns|feature", "pairs": "pair|feature", "random_state": "[Ss]eed"}
+    is_named = re.search(names.get(parameter, parameter), fault.partition(":")[2])
     return "" if fault.startswith("did not name") and is_named else fault
 
 
@@ -127,7 +131,7 @@ def _prediction_fault(model):
 def coding_cells():
     """Yield cells of codings: a fitted one has a bin for every value, and patterns of +1 and -1."""
     numbers, letters = np.linspace(0.0, 1.0, 12), np.array(["a", "b", "c"] * 4)
-    for cls, column, given in (
+    for cls, column, arguments in (
         (RandomInverse, numbers, {}),
         (Anchor, numbers, {}),
         (Circular, numbers, {}),
@@ -136,28 +140,30 @@ def coding_cells():
         (WithMissing, numbers, {}),
     ):
         name, parameters = cls.__name__, parameters_of(cls.__init__)
-        yield from bad_cells(f"{name}({{}})", parameters, partial(_coding_cell, cls, column, given))
-        for word, value in BAD.items():
-            yield f"{name}.fit({word})", _column_cell(cls, given, value)
-        cell = partial(_patterns_cell, cls, column, given)
+        yield from bad_cells(
+            f"{name}({{}})", parameters, partial(_coding_cell, cls, column, arguments)
+        )
+        for value_name, value in BAD.items():
+            yield f"{name}.fit({value_name})", _column_cell(cls, arguments, value)
+        cell = partial(_patterns_cell, cls, column, arguments)
         yield from bad_cells(f"{name}.patterns({{}})", ["n_units", "seed"], cell)
 
 
-def _coding_cell(cls, column, given, parameter, value):
+def _coding_cell(cls, column, arguments, parameter, value):
     def call():
         with np.errstate(over="raise", invalid="raise", divide="raise"):
-            coding = cls(**{**given, parameter: value()}).fit(column, 40)
+            coding = cls(**{**arguments, parameter: value()}).fit(column, 40)
             return _coding_fault(coding, coding.bins(column))
 
     shown = None if parameter == "categories" else value  # whose error may show missing ones
     return lambda: judged(parameter, call, value=shown)
 
 
-def _patterns_cell(cls, column, given, parameter, value):
+def _patterns_cell(cls, column, arguments, parameter, value):
     """Return a function that accepts an error of any type, as callers have checked both values."""
 
     def run():
-        fitted = cls(**given).fit(column, 40)
+        fitted = cls(**arguments).fit(column, 40)
         with contextlib.suppress(Exception):
             patterns = fitted.patterns(**{"n_units": 40, "seed": 1, parameter: value()})
             return "" if set(np.unique(patterns)) == {-1, 1} else f"gave {patterns}"
@@ -166,10 +172,10 @@ def _patterns_cell(cls, column, given, parameter, value):
     return run
 
 
-def _column_cell(cls, given, value):
+def _column_cell(cls, arguments, value):
     def call():
         column = np.atleast_1d(np.asarray(value()))
-        coding = cls(**given).fit(column, 40)
+        coding = cls(**arguments).fit(column, 40)
         return _coding_fault(coding, coding.bins(column))
 
     return lambda: _without_name(call)
@@ -254,7 +260,7 @@ ELSEWHERE = {"evaluate", "load_agent"}
 """Functions whose cells are in bad_inputs.py."""
 
 NAMED = {"word": "experiment", "label": "agent", "n_episodes": "episodes", "name": "(name|set)"}
-"""Words by which messages name a parameter."""
+"""Names or regular expressions that messages have for a parameter, where it is not its own."""
 
 
 def tiny_agent():
@@ -264,13 +270,14 @@ def tiny_agent():
 
 
 def public_functions():
+    """Yield the full names of public functions, and the functions, but those of `ELSEWHERE`."""
     packages = [f"sdnn.{package}" for package in PACKAGES]
-    for name_of_module in (*packages, "sdnn", "sdnn.coding.kernel", "sdnn.export"):
-        module = importlib.import_module(name_of_module)
+    for module_name in (*packages, "sdnn", "sdnn.coding.kernel", "sdnn.export"):
+        module = importlib.import_module(module_name)
         for name in module.__all__:
             value = getattr(module, name)
             if inspect.isfunction(value) and name not in ELSEWHERE:
-                yield f"{name_of_module}.{name}", value
+                yield f"{module_name}.{name}", value
 
 
 def function_cells():
@@ -285,18 +292,18 @@ def function_cells():
 
 def _kernel_cell(parameter, value):
     def call():
-        given = {"coding": "anchor", "n_inputs": 2, "n_units": 100, parameter: value()}
-        made = kernel.AnalyticKernel(**given)
-        return "" if np.isfinite(made(np.zeros((2, 2)))).all() else "gave NaN"
+        arguments = {"coding": "anchor", "n_inputs": 2, "n_units": 100, parameter: value()}
+        analytic = kernel.AnalyticKernel(**arguments)
+        return "" if np.isfinite(analytic(np.zeros((2, 2)))).all() else "gave NaN"
 
     return lambda: judged(parameter, call)
 
 
 def _call_cell(parameter, value):
     def call():
-        given = {"X": np.zeros((2, 2)), parameter: value()}
-        made = kernel.AnalyticKernel("anchor", n_inputs=2, n_units=100)
-        return "" if np.isfinite(made(**given)).all() else "gave NaN"
+        arguments = {"X": np.zeros((2, 2)), parameter: value()}
+        analytic = kernel.AnalyticKernel("anchor", n_inputs=2, n_units=100)
+        return "" if np.isfinite(analytic(**arguments)).all() else "gave NaN"
 
     return lambda: judged(parameter, call)
 
@@ -304,16 +311,16 @@ def _call_cell(parameter, value):
 def _function_cell(function, parameter, value):
     def run():
         parameters = parameters_of(function)
-        given = {name: GOOD[name]() for name in parameters} | {parameter: value()}
+        arguments = {name: GOOD[name]() for name in parameters} | {parameter: value()}
         if "case" in parameters and parameter != "agent":
-            given["agent"] = "sdnn-c"
+            arguments["agent"] = "sdnn-c"
 
         def call():
-            function(**given)
+            function(**arguments)
             return ""
 
         if parameter not in OBJECTS:
-            return _without_key(NAMED.get(parameter, parameter), call)
+            return _with_config_error(NAMED.get(parameter, parameter), call)
         with contextlib.suppress(Exception):
             call()
         return ""
@@ -335,11 +342,11 @@ def experiment_cells():
 
 
 def _experiment_cell(use, parameter, value):
-    return lambda: _without_key(parameter, lambda: use({parameter: value()}), value)
+    return lambda: _with_config_error(parameter, lambda: use({parameter: value()}), value)
 
 
-def _without_key(parameter, call, value=None):
-    """Return the fault of a call whose ConfigError counts as a ValueError."""
+def _with_config_error(parameter, call, value=None):
+    """Return the fault of a call that may raise a ConfigError, which counts as a ValueError."""
 
     def converted():
         try:
@@ -350,28 +357,29 @@ def _without_key(parameter, call, value=None):
     return judged(parameter, converted, value=value)
 
 
-def _use_protocol(given):
-    return _use_spec({"protocol": ProtocolSpec(**given), "budget": BudgetSpec(episodes=20)})
+def _use_protocol(arguments):
+    return _use_spec({"protocol": ProtocolSpec(**arguments), "budget": BudgetSpec(episodes=20)})
 
 
-def _use_budget(given):
-    return _use_spec({"budget": BudgetSpec(**given)})
+def _use_budget(arguments):
+    return _use_spec({"budget": BudgetSpec(**arguments)})
 
 
-def _use_environment(given):
-    environment = EnvironmentSpec(**{"id": "Pendulum-v1", **given})
+def _use_environment(arguments):
+    environment = EnvironmentSpec(**{"id": "Pendulum-v1", **arguments})
     with contextlib.suppress(ConfigError):  # of an id that nobody has registered
         observation, _ = environment.make().reset(seed=1)
         return "" if np.isfinite(observation).all() else f"gave {observation}"
     return ""
 
 
-def _use_spec(given):
-    RunSpec(**{"environment": "Pendulum-v1", "agent": "fuzzy"} | given).make_trial(1).advance(1)
+def _use_spec(arguments):
+    RunSpec(**{"environment": "Pendulum-v1", "agent": "fuzzy"} | arguments).make_trial(1).advance(1)
     return ""
 
 
 def environment_cells():
+    """Yield cells of environments, their configurations and the schedule of the goal."""
     for maker in (AcrobotSwingUpEnv, AcrobotSwingUpVectorEnv, PaperAcrobotEnv):
         parameters = parameters_of(maker.__init__)
         yield from bad_cells(f"{maker.__name__}({{}})", parameters, partial(_env_cell, maker))

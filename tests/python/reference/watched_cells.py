@@ -10,13 +10,20 @@ import warnings
 from multiprocessing import forkserver
 
 CELL_SECONDS = 30.0 * (6 if "ASAN_OPTIONS" in os.environ else 1)
-"""Limit of processor time. Cells take 10 s, fifteen times as long under sanitizers as without;
-others on the machine lengthen it up to three times."""
+"""Limit of the processor time of a cell.
+
+The slowest take 10 s, up to three times as long on a busy machine. Sanitizers lengthen cells up to
+fifteen times.
+"""
 
 HANG_SECONDS = 120.0
+"""Time without a report after which a cell counts as a hang."""
+
 START_SECONDS = 120.0
+"""Time within which a process must have imported its modules and made the list of cells."""
+
 HEADROOM = 2**32
-"""Bytes of address space that cells may ask for, beyond what the process begins with."""
+"""Bytes of address space that cells may allocate, beyond those of the process at the start."""
 
 
 def failures(make_cells, *arguments):
@@ -27,16 +34,9 @@ def failures(make_cells, *arguments):
     nothing for `HANG_SECONDS`, another process runs the cells that follow.
     """
     context = multiprocessing.get_context("forkserver")
-    # The server imports what cells use, once. It begins with this environment and search path;
-    # its processes take the environment of their own time.
-    context.set_forkserver_preload([make_cells.__module__])
-    environment, former_path = dict(os.environ), os.environ.get("PYTHONPATH")
-    os.environ["PYTHONPATH"] = os.pathsep.join(dict.fromkeys(filter(None, sys.path)))
-    forkserver.ensure_running()
-    if former_path is None:
-        del os.environ["PYTHONPATH"]
-    else:
-        os.environ["PYTHONPATH"] = former_path
+    context.set_forkserver_preload([make_cells.__module__])  # the server imports it once
+    environment = dict(os.environ)
+    _start_server_with_search_path()
     failed, first, n_cells = [], 0, None
     while n_cells is None or first < n_cells:
         here, there = context.Pipe(duplex=False)
@@ -44,7 +44,7 @@ def failures(make_cells, *arguments):
         worker = context.Process(target=_work, args=work)
         worker.start()
         there.close()
-        name, fault = "the start", None
+        name = "the start"
         try:
             n_cells = _received(here, START_SECONDS)
             for number in range(first, n_cells):
@@ -63,14 +63,32 @@ def failures(make_cells, *arguments):
     return n_cells, failed
 
 
+def _start_server_with_search_path():
+    """Start the server of processes, which finds the modules that this process finds.
+
+    It has the environment of its start, so that the search path is in the environment until then.
+    """
+    former_path = os.environ.get("PYTHONPATH")
+    os.environ["PYTHONPATH"] = os.pathsep.join(dict.fromkeys(filter(None, sys.path)))
+    forkserver.ensure_running()
+    if former_path is None:
+        del os.environ["PYTHONPATH"]
+    else:
+        os.environ["PYTHONPATH"] = former_path
+
+
 def _received(pipe, seconds):
+    """Return the next object of a pipe; TimeoutError if none comes, EOFError if none can come."""
     if not pipe.poll(seconds):
         raise TimeoutError
     return pipe.recv()
 
 
 def _work(pipe, environment, first, make_cells, arguments):
-    """Run cells from number ``first`` on; send the number of all, then each name and fault."""
+    """Run cells from number ``first`` on; send the number of all, then each name and fault.
+
+    ``environment`` replaces that of the server, which may have started long before.
+    """
     os.environ.clear()
     os.environ.update(environment)
     home = os.getcwd()
