@@ -6,7 +6,7 @@ from dataclasses import replace
 import gymnasium as gym
 import numpy as np
 
-from c_policies import STRICT, box, lies_between, run
+from c_policies import STRICT, box, lies_between, macros, run, store_action
 from sdnn.agents import ActorCriticConfig, QLambdaConfig, SDNNActorCritic, SDNNQLambda, Transition
 from sdnn.approximators import LinearSDNNConfig
 from sdnn.export import export_c_header
@@ -20,23 +20,19 @@ def warmed_up(agent, n_steps=WARM_UP_STEPS):
     random = np.random.default_rng(1)
     space = agent.observation_space
     agent.begin_episode()
-    now, velocity = np.zeros(gym.spaces.flatdim(space)), 0.0
+    positions, velocity = np.zeros(gym.spaces.flatdim(space)), 0.0
     for _ in range(n_steps):
-        action = agent.act(element_of(space, now))
+        observation = element_of(space, positions)
+        action = agent.act(observation)
         push = np.sum(np.asarray(action, float)) - 1.0
         velocity = 0.9 * velocity + 0.1 * push + random.normal(0, 0.02)
-        following = 0.9 * now + 0.1 * velocity + random.normal(0, 0.1, now.size)
-        ends = bool(random.random() < 0.05)
-        agent.learn(
-            Transition(
-                element_of(space, now), action, float(following[0]), element_of(space, following),
-                ends,
-            )
-        )  # fmt: skip
-        now = following
-        if ends:
+        positions = 0.9 * positions + 0.1 * velocity + random.normal(0, 0.1, positions.size)
+        terminated, reward = bool(random.random() < 0.05), float(positions[0])
+        next_observation = element_of(space, positions)
+        agent.learn(Transition(observation, action, reward, next_observation, terminated))
+        if terminated:
             agent.begin_episode()
-            now, velocity = random.normal(0, 0.3, now.size), 0.0
+            positions, velocity = random.normal(0, 0.3, positions.size), 0.0
     agent.begin_episode()
     return agent
 
@@ -151,20 +147,19 @@ POLICIES = {
 
 # A line of input: 1 where an episode begins, else 0, and an observation.
 DRIVER = """
-{define}
 #include "policy.h"
 #include <stdio.h>
 static policy_episode episode;
-int main(void) {{
-  {type} begins, x[POLICY_N_OBSERVED]; uint32_t action[POLICY_N_DIMENSIONS];
-  while (fread(&begins, sizeof begins, 1, stdin) == 1) {{
+int main(void) {
+  NUMBER begins, x[POLICY_N_OBSERVED]; uint32_t action[POLICY_N_DIMENSIONS];
+  while (fread(&begins, sizeof begins, 1, stdin) == 1) {
     if (fread(x, sizeof *x, POLICY_N_OBSERVED, stdin) != POLICY_N_OBSERVED) return 1;
     if (begins > 0) policy_begin_episode(&episode);
-    {call};
+    ACT;
     fwrite(action, sizeof *action, POLICY_N_DIMENSIONS, stdout);
-  }}
+  }
   return 0;
-}}
+}
 """
 
 GREEDY = {
@@ -182,13 +177,14 @@ def steps_of(agent, n, seed):
     """Return rows: 1 where an episode begins, else 0, and observations, some outside the ranges."""
     random = np.random.default_rng(seed)
     size = gym.spaces.flatdim(agent.observation_space)
-    rows, now = [], None
+    rows, begins = [], True
     for _ in range(n):
-        begins = now is None
-        now = random.normal(0, 1.0, size) if begins else 0.9 * now + random.normal(0, 0.3, size)
-        rows.append([begins, *now])
-        if random.random() < 0.05:
-            now = None
+        if begins:
+            positions = random.normal(0, 1.0, size)
+        else:
+            positions = 0.9 * positions + random.normal(0, 0.3, size)
+        rows.append([begins, *positions])
+        begins = random.random() < 0.05
     return np.array(rows, float)
 
 
@@ -203,13 +199,13 @@ def actions_at(agent, indices):
 
 
 @functools.cache
-def expected_of(name, kind, fraction_bits, n_steps):
-    """Return lines of input and the agent's actions for them."""
+def expected_of(name, number_type, fraction_bits, n_steps):
+    """Return lines of input for `DRIVER`, and the agent's actions for them."""
     agent, steps = policy(name), steps_of(policy(name), n_steps, 2)
-    scale = 2.0**fraction_bits if kind == "int32_t" else 1.0
-    dtype = {"int32_t": "<i4", "float": "<f4", "double": "<f8"}[kind]
+    scale = 2.0**fraction_bits if number_type == "int32_t" else 1.0
+    dtype = {"int32_t": "<i4", "float": "<f4", "double": "<f8"}[number_type]
     steps[:, 1:] *= scale
-    lines = np.round(steps).astype(dtype) if kind == "int32_t" else steps.astype(dtype)
+    lines = np.round(steps).astype(dtype) if number_type == "int32_t" else steps.astype(dtype)
     expected = []
     for begins, *variables in lines.astype(float):
         if begins:
@@ -219,19 +215,19 @@ def expected_of(name, kind, fraction_bits, n_steps):
     return lines, expected
 
 
-def check_policy(name, kind, target, folder, n_steps=3000):
-    """Check that a program takes the agent's actions in episodes."""
+def check_policy(name, number_type, target, folder, n_steps=3000):
+    """Check that a program chooses the agent's actions in episodes, from numbers of a type of C."""
     agent = policy(name)
     header = export_c_header(agent, folder / "policy.h")
-    function = GREEDY[kind]
+    function = GREEDY[number_type]
     if lies_between(agent):
-        function, kind = "policy_place", "int32_t"
-    has_one = agent.n_dimensions == 1
-    call = f"action[0] = {function}(&episode, x)" if has_one else f"{function}(&episode, x, action)"
-    define = "" if kind == "int32_t" else "#define POLICY_USE_FLOAT"
-    (folder / "main.c").write_text(DRIVER.format(define=define, type=kind, call=call))
+        function, number_type = "policy_place", "int32_t"
+    definitions = {"NUMBER": number_type, "ACT": store_action(agent, function, "&episode, x")}
+    if number_type != "int32_t":
+        definitions["POLICY_USE_FLOAT"] = ""
+    (folder / "main.c").write_text(macros(**definitions) + DRIVER)
     command = target.compile(folder / "main.c", *STRICT, "-O2")
-    lines, expected = expected_of(name, kind, header.fraction_bits, n_steps)
+    lines, expected = expected_of(name, number_type, header.fraction_bits, n_steps)
     written = np.frombuffer(run(*command, input=lines.tobytes()), "<u4")
     actions = [actions_at(agent, indices) for indices in written.reshape(-1, agent.n_dimensions)]
     np.testing.assert_array_equal(actions, np.reshape(expected, (n_steps, -1)))

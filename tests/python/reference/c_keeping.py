@@ -1,11 +1,14 @@
-"""Programs in C that store agents while the power is cut, or keep an agent's best policy."""
+"""Programs in C that store agents while the power is cut, or keep an agent's best policy.
+
+See docs/how-to/save-on-a-microcontroller.md for what the functions of the header do.
+"""
 
 from pathlib import Path
 
 import numpy as np
 
 from c_learners import index_without_draw, lines_of, run_agent
-from c_policies import STRICT, lies_between, place_of, run
+from c_policies import STRICT, lies_between, macros, place_of, run, store_action
 from sdnn.export import c_header, load_image, save_image
 
 POWER_CUTS = Path(__file__).parent / "power_cuts.c"
@@ -21,18 +24,21 @@ def compiled(source, agent, folder, target, *options):
 def cut_power(make, folder, target, n_states, stride, *options):
     """Run power_cuts.c; return its counts: cuts, states lost, wrong or not stored, violations."""
     agent = make()
-    is_vector = agent.n_dimensions > 1
-    act = (
-        "agent_act(learner, x[0], action)" if is_vector else "action[0] = agent_act(learner, x[0])"
+    action = "action" if agent.n_dimensions > 1 else "action[0]"
+    reward, is_end = "any_byte() * 512 - 65536", "step % 9 == 0"
+    definitions = macros(
+        ACT=store_action(agent, "agent_act", "learner, x[0]"),
+        LEARN=f"agent_learn(learner, x[0], {action}, {reward}, x[1], {is_end})",
     )
-    learn = f"agent_learn(learner, x[0], {'action' if is_vector else 'action[0]'}"
-    learn += ", any_byte() * 512 - 65536, x[1], step % 9 == 0)"
-    source = POWER_CUTS.read_text().replace("ACT;", f"{act};").replace("LEARN;", f"{learn};")
+    source = definitions + POWER_CUTS.read_text()
     power_cuts = compiled(source, agent, folder, target, "-O2", *options)
     return [int(number) for number in run(*power_cuts, n_states, stride).split()]
 
 
-BEST = """
+# Reads the images of two agents, keeps the policy of the first, and loads the second. Then it reads
+# observations and writes the actions of the kept policy. An exit code but 0 is the number of a
+# check that failed.
+KEEP_BEST = """
 #include <stdio.h>
 #include <string.h>
 #include "agent.h"
@@ -50,7 +56,7 @@ static int write_memory(void *context, uint32_t offset, const uint8_t *bytes, ui
 }
 int main(void) {
   int32_t x[AGENT_N_OBSERVED];
-  uint32_t action[AGENT_N_DIMENSIONS], greedy[AGENT_N_DIMENSIONS];
+  uint32_t best[AGENT_N_DIMENSIONS], greedy[AGENT_N_DIMENSIONS];
   EPISODES
   if (fread(images, 1, sizeof images, stdin) != sizeof images) return 1;
   if (agent_begin_keeping(&keeper, memory, read_memory, write_memory, 2)) return 2;
@@ -63,13 +69,13 @@ int main(void) {
   if (!agent_begin_keeping(&same, memory, read_memory, write_memory, 2)) return 7;
   if (same.best != -7 || same.scale != keeper.scale) return 8;
   while (fread(x, sizeof *x, AGENT_N_OBSERVED, stdin) == AGENT_N_OBSERVED) {
-    BEST;
-    fwrite(action, sizeof *action, AGENT_N_DIMENSIONS, stdout);
+    ACT_BEST;
+    fwrite(best, sizeof *best, AGENT_N_DIMENSIONS, stdout);
   }
-  fails = 1; /* then it acts by the present policy, as it does where nothing is kept */
-  BEST;
-  GREEDY;
-  if (memcmp(action, greedy, sizeof action)) return 9;
+  fails = 1; /* the memory cannot be read: the agent acts by its present policy */
+  ACT_BEST;
+  ACT_GREEDY;
+  if (memcmp(best, greedy, sizeof best)) return 9;
   fails = 0;
   memory[9] ^= 16;
   if (agent_begin_keeping(&same, memory, read_memory, write_memory, 2)) return 10;
@@ -79,39 +85,47 @@ int main(void) {
 
 
 def check_best(make, target, folder, *options):
-    """Check that a kept policy acts as the agent did when it was kept."""
+    """Check that a kept policy acts as the agent did when it was kept, and not as it does later."""
     agent = make()
     header = c_header(agent, "agent", learning=True)
     run_agent(agent, lines_of(agent, 400, 1, header.fraction_bits), header.fraction_bits)
     kept = save_image(agent)
-    later = make()  # learns more, so that its policy differs from the kept one
+    later = make()
     load_image(later, kept)
     run_agent(later, lines_of(later, 900, 2, header.fraction_bits), header.fraction_bits)
-    n = agent.n_dimensions
-    has_history = agent.history != "none"
-    place = "_place" if lies_between(agent) else ""
-    arguments = [f"agent_best{place}(&agent, &keeper, ", "agent_place(&agent, "]
-    if not place:
-        arguments[1] = "agent_greedy(&agent, "
-    calls = []
-    for call, array in zip(arguments, ("action", "greedy"), strict=True):
-        full = f"{call}{f'&{array}_episode, ' if has_history else ''}x"
-        calls.append(f"{array}[0] = {full})" if n == 1 else f"{full}, {array})")
-    episodes = ""
-    if has_history:
-        episodes = "static agent_greedy_episode action_episode, greedy_episode;"
-        begin = "agent_begin_greedy_episode(&agent, &{}_episode); "
-        calls = [begin.format(a) + c for a, c in zip(("action", "greedy"), calls, strict=True)]
-    source = BEST.replace("EPISODES", episodes)
-    source = source.replace("  BEST;", f"  {calls[0]};").replace("GREEDY;", f"{calls[1]};")
-    best = compiled(source, agent, folder, target, *options)
+    source = macros_of_acting(agent) + KEEP_BEST
+    keep_best = compiled(source, agent, folder, target, *options)
     lines = lines_of(agent, 600, 3, header.fraction_bits)
-    observations = np.ascontiguousarray(lines[:, 1 : (lines.shape[1] - 3) // 2 + 1])
-    written = run(*best, input=kept + save_image(later) + observations.tobytes())
-    actions = np.frombuffer(written, "<u4").reshape(-1, n).tolist()
-    assert actions == [greedy_indices(agent, x / 2.0**header.fraction_bits) for x in observations]
-    others = [greedy_indices(later, x / 2.0**header.fraction_bits) for x in observations]
-    assert actions != others
+    n_observed = (lines.shape[1] - 3) // 2
+    observations = np.ascontiguousarray(lines[:, 1 : n_observed + 1])
+    written = run(*keep_best, input=kept + save_image(later) + observations.tobytes())
+    actions = np.frombuffer(written, "<u4").reshape(-1, agent.n_dimensions).tolist()
+    scaled = observations / 2.0**header.fraction_bits
+    assert actions == [greedy_indices(agent, x) for x in scaled]
+    assert actions != [greedy_indices(later, x) for x in scaled]
+
+
+def macros_of_acting(agent):
+    """Return the macros of `KEEP_BEST`: one action by the best policy, and one by the present.
+
+    An agent with a history acts in an episode, which begins with each observation here.
+    """
+    suffix = "_place" if lies_between(agent) else ""
+    best, greedy = f"agent_best{suffix}", "agent_place" if suffix else "agent_greedy"
+    if agent.history == "none":
+        return macros(
+            EPISODES="",
+            ACT_BEST=store_action(agent, best, "&agent, &keeper, x", "best"),
+            ACT_GREEDY=store_action(agent, greedy, "&agent, x", "greedy"),
+        )
+    begin = "agent_begin_greedy_episode(&agent, &{}); ".format
+    act_best = store_action(agent, best, "&agent, &keeper, &best_episode, x", "best")
+    act_greedy = store_action(agent, greedy, "&agent, &greedy_episode, x", "greedy")
+    return macros(
+        EPISODES="static agent_greedy_episode best_episode, greedy_episode;",
+        ACT_BEST=begin("best_episode") + act_best,
+        ACT_GREEDY=begin("greedy_episode") + act_greedy,
+    )
 
 
 def greedy_indices(agent, observation):

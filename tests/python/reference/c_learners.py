@@ -1,7 +1,6 @@
 """Agents that learn in C, with docstrings of what they cover, and checks of their bits."""
 
 import functools
-import subprocess
 from dataclasses import replace
 
 import gymnasium as gym
@@ -9,8 +8,17 @@ import numpy as np
 import pytest
 
 from c_histories import LEARNERS as HISTORIES
-from c_lines import MISSING, REFUSED, has_episodes, lines_of, with_durations
-from c_policies import STRICT, box, lies_between, place_of
+from c_lines import (
+    BEGIN_EPISODE,
+    GREEDY_IN_NEW_EPISODE,
+    LEARN,
+    MISSING,
+    REFUSED,
+    has_episodes,
+    lines_of,
+    with_durations,
+)
+from c_policies import STRICT, box, lies_between, macros, place_of, run, store_action
 from sdnn.agents import (
     ActorCriticConfig,
     QLambdaConfig,
@@ -202,24 +210,26 @@ def _ranges(*sizes):
     return {"observation_range": (-np.array(sizes), np.array(sizes))}
 
 
-# A line of input: what to do (0: begin an episode, 1: act and learn, 2: act greedily, 3: in another
-# episode), observation, reward, next observation, whether it terminated, plus twice the duration.
+# Reads an image, from which the agent continues, and lines of c_lines.py. Writes the actions of all
+# lines, and the image at the end.
 DRIVER = """
 #include <stdio.h>
 #include "agent.h"
 static agent_agent agent;
 static uint8_t image[AGENT_IMAGE_BYTES];
+EPISODE
 int main(void) {
   int32_t line[2 * AGENT_N_OBSERVED + 3];
   uint32_t action[AGENT_N_DIMENSIONS];
-  int32_t *const next = line + 2 + AGENT_N_OBSERVED;
+  const int32_t *const x = line + 1, *const next = line + 2 + AGENT_N_OBSERVED;
   agent_begin(&agent);
   if (fread(image, 1, sizeof image, stdin) != sizeof image) return 1;
   if (!agent_load(&agent, image)) agent_begin(&agent);
   while (fread(line, sizeof *line, 2 * AGENT_N_OBSERVED + 3, stdin) == 2 * AGENT_N_OBSERVED + 3) {
+    const int32_t reward = line[1 + AGENT_N_OBSERVED], end = line[2 * AGENT_N_OBSERVED + 2];
     if (line[0] == 0) agent_begin_episode(&agent);
     if (line[0] == 3) BEGIN_GREEDY;
-    if (line[0] == 1) ACT; else GREEDY;
+    if (line[0] == 1) ACT; else ACT_GREEDY;
     fwrite(action, sizeof *action, AGENT_N_DIMENSIONS, stdout);
     if (line[0] == 1) LEARN;
   }
@@ -241,11 +251,13 @@ def index_without_draw(agent, observation, d, index):
     is_tied = values >= values.max() - tolerance
     if is_tied.sum() == 1:
         return index
+    # Split the indices where ties begin or end, and choose the middle of the longest run of ties.
     runs = np.split(np.arange(len(values)), np.flatnonzero(np.diff(is_tied)) + 1)
-    widest = max((run for run in runs if is_tied[run[0]]), key=len)
-    middle = int(widest[(len(widest) - 1) // 2])
+    longest = max((indices for indices in runs if is_tied[indices[0]]), key=len)
+    middle = int(longest[(len(longest) - 1) // 2])
     if not lies_between(agent):
         return middle
+    # The action lies between those of a box: towards the more probable neighbour, as in C.
     weights = np.pad(np.round(values / values.max() * 2**30), 1).astype(int).tolist()
     below, _, above = neighbours = weights[middle : middle + 3]
     shift = (abs(above - below) << 16) // sum(neighbours)
@@ -259,101 +271,108 @@ def generator_of_greedy_ties(agent):
     return name, state[name].copy()
 
 
+def observation_of(agent, numbers, scale):
+    """Return the observation of numbers of a line: NaN where missing, an index in a table."""
+    observation = np.where(numbers == MISSING, np.nan, numbers / scale)
+    is_listed = isinstance(agent.observation_space, gym.spaces.Discrete)
+    return observation.argmax() if is_listed else observation
+
+
+def act_in_python(agent, observation, explore):
+    """Return an action of the agent, and what a program in C returns for it.
+
+    That is the index of each dimension's part, or the place of a greedy part between two actions.
+    """
+    action = agent.act(observation, explore=explore)
+    parts = list(enumerate(np.ravel(action)))
+    if not explore and lies_between(agent):
+        indices = [place_of(agent.actions_of(d), part) for d, part in parts]
+    else:
+        indices = [np.abs(agent.actions_of(d) - part).argmin() for d, part in parts]
+    if not explore:
+        indices = [index_without_draw(agent, observation, d, i) for d, i in enumerate(indices)]
+    return action, indices
+
+
 def run_agent(agent, lines, fraction_bits):
-    """Return the indices of the actions that the library's agent takes for the lines.
+    """Return the indices of the actions that the library's agent chooses for the lines.
 
     Greedy actions draw no random numbers in C: the agent's generator for them is set back.
     """
-    n, scale = (lines.shape[1] - 3) // 2, 2.0**fraction_bits
-    actions = []
+    n_observed, scale = (lines.shape[1] - 3) // 2, 2.0**fraction_bits
+    all_indices = []
     agent._has_warned = True  # of rewards that are too large
     name, generator = generator_of_greedy_ties(agent)
-    for line in lines.tolist():
-        read = [np.array(part, float) for part in (line[1 : n + 1], line[n + 2 : -1])]
-        now, following = (np.where(part == MISSING, np.nan, part / scale) for part in read)
-        if isinstance(agent.observation_space, gym.spaces.Discrete):
-            now, following = now.argmax(), following.argmax()
-        if line[0] == 0:
+    for task, *numbers in lines.tolist():
+        numbers = np.array(numbers, float)
+        observation = observation_of(agent, numbers[:n_observed], scale)
+        next_observation = observation_of(agent, numbers[n_observed + 1 : -1], scale)
+        reward, end = float(numbers[n_observed] / scale), int(numbers[-1])
+        if task == BEGIN_EPISODE:
             agent.begin_episode()
-        if line[0] == 3:
+        if task == GREEDY_IN_NEW_EPISODE:
             agent.begin_greedy_episode()
-        is_refused = agent.missing == "error" and np.isnan(now).any()
-        if is_refused:
+        learns = task == LEARN
+        if agent.missing == "error" and np.isnan(observation).any():
             with pytest.raises(ValueError, match="observation"):
-                agent.act(now, explore=line[0] == 1)
-            actions.append([REFUSED] * agent.n_dimensions)
+                agent.act(observation, explore=learns)
+            all_indices.append([REFUSED] * agent.n_dimensions)
             continue
-        action = agent.act(now, explore=line[0] == 1)
-        acts_between = line[0] != 1 and lies_between(agent)
-        indices = [
-            place_of(agent.actions_of(d), part) if acts_between
-            else np.abs(agent.actions_of(d) - part).argmin()
-            for d, part in enumerate(np.ravel(action))
-        ]  # fmt: skip
-        if line[0] != 1:
-            indices = [index_without_draw(agent, now, d, index) for d, index in enumerate(indices)]
-        actions.append(indices)
-        is_refused = agent.missing == "error" and np.isnan(following).any()
-        if line[0] == 1 and not is_refused:
-            terminated, dt = line[-1] % 2 == 1, line[-1] // 2 / 2**16 or 1.0
-            step = Transition(now, action, line[n + 1] / scale, following, terminated, dt=dt)
-            if dt >= 0.001:
-                agent.learn(step)
-                continue
+        action, indices = act_in_python(agent, observation, explore=learns)
+        all_indices.append(indices)
+        if not learns or (agent.missing == "error" and np.isnan(next_observation).any()):
+            continue
+        dt = end // 2 / 2**16 or 1.0
+        transition = Transition(
+            observation, action, reward, next_observation, terminated=end % 2 == 1, dt=dt
+        )
+        if dt >= 0.001:
+            agent.learn(transition)
+        else:
             with pytest.raises(ValueError, match="dt"):
-                agent.learn(step)
+                agent.learn(transition)
     agent.begin_episode()
     state = agent._state_of("agent") | {name: generator}
     agent._restore(agent=state, reward_scale=agent._state_of("reward_scale"))
-    return actions
+    return all_indices
 
 
 def build(folder, agent, target, *options, durations=False):
-    """The header and its program, as a command."""
+    """Export an agent and compile `DRIVER` with it; return the header and the command."""
     header = export_c_header(agent, folder / "agent.h", learning=True, durations=durations)
-    one = agent.n_dimensions == 1
-    has_history = has_episodes(agent)
-    function = "agent_place" if lies_between(agent) else "agent_greedy"
-    episode = "&episode, " if has_history else ""
-    act, greedy = "agent_act(&agent, line + 1", f"{function}(&agent, {episode}line + 1"
-    act, greedy = (f"action[0] = {call})" if one else f"{call}, action)" for call in (act, greedy))
-    learn = (
-        f"agent_learn(&agent, line + 1, {'action[0]' if one else 'action'},"
-        " line[1 + AGENT_N_OBSERVED], next, line[2 * AGENT_N_OBSERVED + 2])"
-    )
+    has_memory = has_episodes(agent)
+    greedy = "agent_place" if lies_between(agent) else "agent_greedy"
+    action = "action[0]" if agent.n_dimensions == 1 else "action"
     if durations:
-        ends = "line[2 * AGENT_N_OBSERVED + 2]"
-        learn = learn.replace("learn(", "learn_over(").replace(
-            f"{ends})", f"{ends} & 1, (uint32_t){ends} >> 1)"
-        )
-    begin = "agent_begin_greedy_episode(&agent, &episode)" if has_history else "(void)0"
-    memory = "static agent_greedy_episode episode;" if has_history else ""
-    source = DRIVER.replace("ACT;", f"{act};").replace("LEARN", learn)
-    source = source.replace("BEGIN_GREEDY", begin).replace("GREEDY;", f"{greedy};")
-    source = source.replace("static agent_agent agent;", f"static agent_agent agent; {memory}")
-    (folder / "steps.c").write_text(source)
+        learn = f"agent_learn_over(&agent, x, {action}, reward, next, end & 1, (uint32_t)end >> 1)"
+    else:
+        learn = f"agent_learn(&agent, x, {action}, reward, next, end)"
+    definitions = macros(
+        EPISODE="static agent_greedy_episode episode;" if has_memory else "",
+        BEGIN_GREEDY="agent_begin_greedy_episode(&agent, &episode)" if has_memory else "(void)0",
+        ACT=store_action(agent, "agent_act", "&agent, x"),
+        ACT_GREEDY=store_action(agent, greedy, f"&agent, {'&episode, ' * has_memory}x"),
+        LEARN=learn,
+    )
+    (folder / "steps.c").write_text(definitions + DRIVER)
     return header, target.compile(folder / "steps.c", *STRICT, "-O2", *options)
 
 
 def run_program(command, image, lines, n_dimensions):
     """Run a program; return its actions, and the image with which it ends."""
-    done = subprocess.run(
-        [str(word) for word in command],
-        input=image + np.ascontiguousarray(lines).tobytes(),
-        capture_output=True,
-        check=True,
-    ).stdout
-    n = 4 * n_dimensions * len(lines)
-    return np.frombuffer(done[:n], "<u4").reshape(-1, n_dimensions).tolist(), done[n:]
+    written = run(*command, input=image + np.ascontiguousarray(lines).tobytes())
+    n_bytes = 4 * n_dimensions * len(lines)
+    actions = np.frombuffer(written[:n_bytes], "<u4").reshape(-1, n_dimensions)
+    return actions.tolist(), written[n_bytes:]
 
 
 def exported(name, prefix="agent"):
-    """The header of a learner."""
+    """Return the header of a learner."""
     return c_header(LEARNERS[name](), prefix, learning=True, durations=name in TIMED)
 
 
 def timed_lines_of(name, agent, n_steps, seed, fraction_bits):
-    """Lines of a learner, with durations where it learns them."""
+    """Return the lines of a learner, with durations where it learns them."""
     lines = lines_of(agent, n_steps, seed, fraction_bits)
     return with_durations(lines, np.random.default_rng(seed)) if name in TIMED else lines
 

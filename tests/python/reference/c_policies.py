@@ -59,6 +59,22 @@ def run(*command, **options):
     return done.stdout
 
 
+def macros(**definitions):
+    """Return lines that define names in C: places of a program that differ between agents."""
+    return "".join(f"#define {name} {text}\n" for name, text in definitions.items())
+
+
+def store_action(agent, function, arguments, action="action"):
+    """Return C that calls a function of a header and stores the action in an array.
+
+    The function returns the index of an action of a single dimension. For several it writes an
+    index each to its last argument.
+    """
+    if agent.n_dimensions == 1:
+        return f"{action}[0] = {function}({arguments})"
+    return f"{function}({arguments}, {action})"
+
+
 def program(folder, source, compiler, *options):
     """Compile a program in C or C++, by the compiler; return its path."""
     path = folder / ("main.cpp" if compiler.endswith("++") else "main.c")
@@ -323,14 +339,13 @@ def check_actions(agent, expected, actions):
 
 POLICY = """
 #include "declarations.h"
-{define}
 #include "policy.h"
-uint32_t policy_n_observed(void) {{ return POLICY_N_OBSERVED; }}
-uint32_t policy_n_dimensions(void) {{ return POLICY_N_DIMENSIONS; }}
-void policy_fixed(const int32_t *x, uint32_t *a) {{ {fixed} }}
+uint32_t policy_n_observed(void) { return POLICY_N_OBSERVED; }
+uint32_t policy_n_dimensions(void) { return POLICY_N_DIMENSIONS; }
+void policy_fixed(const int32_t *x, uint32_t *a) { FIXED; }
 #ifdef POLICY_USE_FLOAT
-void policy_double(const double *x, uint32_t *a) {{ {double} }}
-void policy_float(const float *x, uint32_t *a) {{ {float} }}
+void policy_double(const double *x, uint32_t *a) { DOUBLE; }
+void policy_float(const float *x, uint32_t *a) { FLOAT; }
 #endif
 """
 
@@ -366,16 +381,14 @@ int main(int argc, char **argv) {
 def write_policy(folder, agent, *, floats=True, **options):
     """Write the header and a source file that makes its functions callable from others."""
     header = export_c_header(agent, folder / "policy.h", **options)
-    returns_action = agent.n_dimensions == 1
-    functions = {
-        "fixed": "policy_greedy", "double": "policy_greedy_double", "float": "policy_greedy_float",
-    }  # fmt: skip
-    calls = {
-        kind: f"a[0] = {function}(x);" if returns_action else f"{function}(x, a);"
-        for kind, function in functions.items()
+    definitions = {
+        "FIXED": store_action(agent, "policy_greedy", "x", "a"),
+        "DOUBLE": store_action(agent, "policy_greedy_double", "x", "a"),
+        "FLOAT": store_action(agent, "policy_greedy_float", "x", "a"),
     }
-    define = "#define POLICY_USE_FLOAT" if floats else ""
-    (folder / "policy.c").write_text(POLICY.format(define=define, **calls))
+    if floats:
+        definitions["POLICY_USE_FLOAT"] = ""
+    (folder / "policy.c").write_text(macros(**definitions) + POLICY)
     (folder / "declarations.h").write_text(DECLARATIONS)
     (folder / "driver.c").write_text(DRIVER)
     return header
