@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import functools
 import math
@@ -47,7 +46,7 @@ _WORDS = {
     "<": "less than",
     "Expected ": "",
 }
-"""Replacements for type names in msgspec's messages."""
+"""Replacements for type names in msgspec's messages, made in this order: ">=" before ">"."""
 
 
 class PartSettings(Protocol):
@@ -128,7 +127,7 @@ def convert_value(value_type: object, value: object, key: str) -> Any:
         for form in _alternatives(value_type):
             if isinstance(form, type) and issubclass(form, Settings):
                 return read_table(form, value, key)
-            if get_origin(form) is dict:
+            if get_origin(form) is dict:  # an error of an item names its key
                 for name, item in value.items():
                     convert_value(get_args(form)[1], item, f"{key}.{name}")
     try:
@@ -153,11 +152,16 @@ def _alternatives(value_type: object) -> tuple[object, ...]:
 
 
 def _expected_value(possible: Iterable[object], text: str) -> str:
-    """Return "must be ..." for one of the possible types, from the text of msgspec's error."""
-    choices = [repr(w) for form in possible if get_origin(form) is Literal for w in get_args(form)]
-    if choices:
+    """Return "must be ..." for one of the possible types, from the text of msgspec's error.
+
+    >>> _expected_value([int], "Expected `int`, got `str`")
+    'must be a whole number'
+    """
+    literals = [form for form in possible if get_origin(form) is Literal]
+    if literals:  # msgspec does not list them
+        choices = ", ".join(repr(word) for literal in literals for word in get_args(literal))
         or_array = " or an array" if any(get_origin(form) is tuple for form in possible) else ""
-        return f"must be one of {', '.join(choices)}{or_array}"
+        return f"must be one of {choices}{or_array}"
     expected = text.partition(", got")[0].replace("Object missing required field", "a table with")
     for name, word in _WORDS.items():
         expected = expected.replace(name, word)
@@ -174,6 +178,8 @@ def check_names(
     for name in values:
         if name not in known:
             path = _path(where, name)
+            # The unknown key itself is no suggestion, such as "learning.epsilon" for an agent
+            # whose `learning` lacks epsilon.
             others = {last: key for last, key in KEYS_BY_NAME.items() if not path.endswith(key)}
             raise UnknownKeyError(path, f"unknown key; {advice(str(name), known, others)}{hint}")
     return values
@@ -214,8 +220,8 @@ def with_changes(base: AnyPart, values: object, where: str, hint: str = "") -> A
     if not fields_of(type(base)):  # a dataclass, which does not check its values
         types_by_name = _types_of_fields(base.__class__)
         values = {
-            name: convert_value(types_by_name[name], v, f"{where}.{name}")
-            for name, v in values.items()
+            name: convert_value(types_by_name[name], value, f"{where}.{name}")
+            for name, value in values.items()
         }
     try:
         return dataclasses.replace(base, **values)
@@ -227,7 +233,9 @@ def with_changes(base: AnyPart, values: object, where: str, hint: str = "") -> A
 def differences(
     values: Mapping[str, object], defaults: Mapping[str, object], always: Collection[str] = ()
 ) -> Values:
-    """Return the values that differ from the default, also in tables; ``always`` keeps names.
+    """Return the values that differ from the default, also in tables.
+
+    Values whose name is in ``always`` are kept even if they are the default.
 
     >>> differences({"a": 1, "b": {"c": 2, "d": 3}}, {"a": 1, "b": {"c": 2, "d": 4}})
     {'b': {'d': 3}}
@@ -251,8 +259,9 @@ def with_n_inputs(approximator: PartSettings, n_inputs: int) -> PartSettings:
 
 
 def _path(table: str, name: str) -> str:
-    """Join the key of a table and a name, or an index such as "[0]"."""
-    return f"{table}{'.' * bool(table and name and name[0] != '[')}{name}"
+    """Join the key of a table and a name, or an index such as "[0]"; either may be empty."""
+    needs_dot = table and name and not name.startswith("[")
+    return f"{table}.{name}" if needs_dot else table + name
 
 
 # The tables of a specification but those of the core and the environment.
@@ -416,33 +425,3 @@ KEYS_BY_NAME = {"environment": "environment", "agent": "agent", "seed": "seed"} 
     for name in names_of(settings_class)
 }
 """The keys of a specification, with dots between tables, by their last part."""
-
-_REPLACED = {
-    "budget.steps": "budget.episodes",
-    "budget.episodes": "budget.steps",
-    "protocol.evaluate_every": "protocol.evaluate_every_episodes",
-    "protocol.evaluate_every_episodes": "protocol.evaluate_every",
-    "agent.name": "agent.preset",
-}
-"""A key of a file that is removed when an option sets another key, since both conflict."""
-
-
-def overridden(values: Mapping[str, object], options: Mapping[str, object]) -> Values:
-    """Return the values of a file with those of options, by dotted keys, in their place."""
-    settings: Values = copy.deepcopy(dict(values))
-    for name, key in SHORTHANDS.items():
-        if isinstance(settings.get(name), str):
-            settings[name] = {key: settings[name]}
-    for key in options:  # remove keys of the file that conflict with an option
-        table, _, name = _REPLACED.get(key, "").partition(".")
-        if isinstance(settings.get(table), dict):
-            settings[table].pop(name, None)
-    for key, value in options.items():
-        *parents, last = key.split(".")
-        inner = settings
-        for parent in parents:
-            if not isinstance(inner.get(parent), dict):
-                inner[parent] = {}
-            inner = inner[parent]
-        inner[last] = value
-    return settings

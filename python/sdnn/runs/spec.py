@@ -96,6 +96,7 @@ class RunSpec(Settings, frozen=True):
             raise ConfigError("seed", f"must be at most 2**64 - 1, got {shown(self.seed)}")
         self._fill_agent()
         self._fill_protocol()
+        self._require_consistency()
 
     def _set(self, **values: object) -> None:
         """Set fields of this frozen object while it is made."""
@@ -103,16 +104,12 @@ class RunSpec(Settings, frozen=True):
             msgspec.structs.force_setattr(self, name, value)
 
     def _fill_agent(self) -> None:
-        """Set the agent's settings that are not given: those of its preset, or its defaults."""
+        """Set the agent's settings that are missing: those of its preset, or its defaults."""
         entry, preset = self._chosen_agent()
         if preset is None and entry.presets:
             preset = "general"
         if preset is not None and preset not in entry.presets:
-            names = ", ".join(map(repr, entry.presets))
-            expected = f"{f'one of {names}' if names else 'omitted'} for the agent {entry.id!r}"
-            others = [other.id for other in AGENTS.values() if preset in other.presets]
-            hint = f", a preset of {' and '.join(others)}" if others else ""
-            raise ConfigError("agent.preset", f"must be {expected}, got {shown(preset)}{hint}")
+            raise _unknown_preset(entry, preset)
         defaults = entry.settings(preset)
         hint = f" (agent {entry.id})"
         for name in ("approximator", "learning"):
@@ -121,13 +118,15 @@ class RunSpec(Settings, frozen=True):
             is_preset = value is None or isinstance(value, PresetSettings)
             self._set(**{name: base if is_preset else with_changes(base, value, name, hint)})
         agent, is_scaled = self.agent, self.environment.changes_observations
-        followed = {
-            # Scaled values are on no circle.
+        agent_defaults = {
+            # Cosine and sine, each scaled to [0, 1] by itself, are no longer on a circle.
             "angle_pairs": "none" if is_scaled else defaults.angle_pairs,
             "inputs": defaults.inputs,
             "history": "none" if agent.missing == "code" else defaults.history,
         }
-        missing = {name: v for name, v in followed.items() if getattr(agent, name) is None}
+        missing = {
+            name: value for name, value in agent_defaults.items() if getattr(agent, name) is None
+        }
         self._set(agent=agent.replace(name=entry.id, preset=preset, **missing))
 
     def _chosen_agent(self) -> tuple[AgentEntry, str | None]:
@@ -144,13 +143,17 @@ class RunSpec(Settings, frozen=True):
         return agent_entry(name), preset_in_label or preset
 
     def _fill_protocol(self) -> None:
-        """Set protocol and budget where not given; ConfigError if settings do not go together."""
+        """Set interval of evaluations and budget if they are missing."""
         protocol, budget = self.protocol, self.budget
-        if protocol.evaluate_every is protocol.evaluate_every_episodes is None:
+        if protocol.evaluate_every is None and protocol.evaluate_every_episodes is None:
             protocol = protocol.replace(evaluate_every=DEFAULT_INTERVAL)
-        if budget.steps is budget.episodes is None:
+        if budget.steps is None and budget.episodes is None:
             budget = budget.replace(steps=DEFAULT_STEPS)
         self._set(protocol=protocol, budget=budget)
+
+    def _require_consistency(self) -> None:
+        """Raise ConfigError if settings of several tables do not go together."""
+        protocol, budget = self.protocol, self.budget
         every, keep_best = protocol.evaluate_every, self.output.keep_best
         if not self.is_evaluated and (budget.target_return is not None or keep_best):
             key = "output.keep_best" if keep_best else "budget.target_return"
@@ -348,12 +351,13 @@ class RunSpec(Settings, frozen=True):
         """Return the settings that only some agents have, as far as they are not the default."""
         values = {name: getattr(self.agent, name) for name in _OPTIONAL}
         defaults = AgentSpec(angle_pairs="none", inputs="all", history="none")
-        return {k: value for k, value in values.items() if value != getattr(defaults, k)}
+        return {name: value for name, value in values.items() if value != getattr(defaults, name)}
 
     def _agent_arguments(self, env: Env) -> dict[str, object]:
         """Return the arguments that only some agents have: those that are not the default."""
         arguments, environment = self._optional_settings(), self.environment
-        if _is_class_of(self.entry.agent, ValueAgent) and self.entry.presets:  # by its preset
+        if _is_class_of(self.entry.agent, ValueAgent) and self.entry.presets:
+            # Without these arguments the agent would take the defaults of its own preset.
             names = ("angle_pairs", "inputs", "history")
             arguments |= {name: getattr(self.agent, name) for name in names}
         if not environment.ranges:
@@ -429,5 +433,15 @@ class RunSpec(Settings, frozen=True):
         return config_hash(self.canonical_json())
 
 
+def _unknown_preset(entry: AgentEntry, preset: str) -> ConfigError:
+    """Return the error about a preset that an agent lacks; it names the agents that have it."""
+    names = ", ".join(map(repr, entry.presets))
+    expected = f"{f'one of {names}' if names else 'omitted'} for the agent {entry.id!r}"
+    others = [other.id for other in AGENTS.values() if preset in other.presets]
+    hint = f", a preset of {' and '.join(others)}" if others else ""
+    return ConfigError("agent.preset", f"must be {expected}, got {shown(preset)}{hint}")
+
+
 def _is_class_of(agent: object, ancestor: type[object]) -> bool:
+    """Return whether an entry's agent is a subclass; it may also be a function that makes one."""
     return isinstance(agent, type) and issubclass(agent, ancestor)

@@ -23,7 +23,7 @@ import msgspec
 import numpy as np
 
 from sdnn.runs.errors import ChangedRowsError, StoreError
-from sdnn.runs.journal import BUSY_SECONDS, foreign_journal, has_rows, is_hot
+from sdnn.runs.journal import connect, foreign_journal, has_rows, is_hot
 from sdnn.runs.trial import ROW, Hash, TrialKey, TrialRecord, TrialRows, config_hash as hash_of
 from sdnn.support.files import is_there, open_regular
 
@@ -34,8 +34,6 @@ SCHEMA_VERSION = 6
 APPLICATION_ID = int.from_bytes(b"sdnn", "big")
 """Value of SQLite's header field ``application_id`` in files of this library."""
 MOST_BYTES = 2**37  # largest file: SQLite's integrity check needs memory, a bit for each page
-
-MOST_BYTES_OF_VALUE = 2**24  # longest text in the file
 MOST_MEASUREMENTS = 10**5  # a report has only some hundreds
 _SCHEMA = files("sdnn.runs").joinpath("schema.sql").read_text("utf-8")
 
@@ -86,29 +84,31 @@ class ResultStore(AbstractContextManager["ResultStore"]):
         self.path = folder / STORE_NAME
         if folder.exists() and not folder.is_dir():
             raise StoreError(f"the output must be a folder, but {folder} is a file")
-        self._hashes: dict[int, Hash] = {}  # hashes of the rows of runs in progress, by run
-        with as_store_error(self.path), ExitStack() as on_error:
+        self._hashes: dict[int, Hash] = {}  # of the rows that `extend` has stored, by run id
+        with as_store_error(self.path):
             if not read_only:
                 folder.mkdir(parents=True, exist_ok=True)
-            recovered = self._recovered()
-            if recovered is not None:
-                if read_only:
-                    self._connection = on_error.enter_context(closing(recovered))
-                    if not _objects(recovered):
-                        self._prepare(True)
-                    on_error.pop_all()
-                    return
-                recovered.close()
-                with closing(connect(self.path)) as connection:
-                    connection.execute("PRAGMA user_version").fetchone()  # rolls back a journal
-            is_new = _inspect(self.path)
-            if read_only and not is_new:
-                self._connection = connect(self.path, read_only=True)
-                return
-            place = None if read_only else self.path
-            self._connection = on_error.enter_context(closing(connect(place)))
-            self._prepare(is_new)
-            on_error.pop_all()
+            self._connection = self._open(read_only)
+
+    def _open(self, read_only: bool) -> sqlite3.Connection:
+        """Connect to the file, or to a database in memory where reading would have to write it."""
+        recovered = self._recovered()
+        if recovered is not None and read_only:
+            return recovered
+        if recovered is not None:
+            recovered.close()  # its making has shown that the journal belongs to the file
+            with closing(connect(self.path)) as connection:
+                connection.execute("PRAGMA user_version").fetchone()  # rolls the transaction back
+        is_new = _inspect(self.path)
+        if read_only and not is_new:
+            return connect(self.path, read_only=True)
+        connection = connect(None if read_only else self.path)
+        try:
+            self._prepare(connection, is_new)
+        except BaseException:
+            connection.close()
+            raise
+        return connection
 
     def _recovered(self) -> sqlite3.Connection | None:
         """Return a copy in memory with an unfinished transaction rolled back; None without one."""
@@ -125,17 +125,19 @@ class ResultStore(AbstractContextManager["ResultStore"]):
             try:
                 with closing(connect(copy)) as connection:  # rolls the transaction back
                     connection.backup(recovered)
-                is_lost = _inspect(copy) and has_rows(self.path)
+                is_empty = _inspect(copy)
             except (sqlite3.DatabaseError, StoreError) as error:
                 raise foreign_journal(journal) from error
-            if is_lost:
+            # No transaction of this library makes both the schema and rows.
+            if is_empty and has_rows(self.path):
                 raise foreign_journal(journal)
+            if is_empty:  # the unfinished transaction was that of the schema
+                self._prepare(recovered, is_new=True)
             on_error.pop_all()
         return recovered
 
-    def _prepare(self, is_new: bool) -> None:
+    def _prepare(self, connection: sqlite3.Connection, is_new: bool) -> None:
         """Set how the file is written; a new one gets the schema."""
-        connection = self._connection
         for setting in ("journal_mode = DELETE", "synchronous = FULL", "foreign_keys = ON"):
             connection.execute(f"PRAGMA {setting}")
         if is_new:
@@ -194,7 +196,7 @@ class ResultStore(AbstractContextManager["ResultStore"]):
         """
         with self.together():
             run = self._run_in_progress(key, config, version)
-            hashed = rows.hashed(self._hash_before(run, first))
+            hashed = rows.hashed(self._delete_from(run, first))
             self._insert(run.id, rows)
             seconds, checksum = seconds + run.seconds, hashed.hexdigest()
             self._update(run._replace(seconds=seconds, finished_at=None, checksum=checksum))
@@ -229,6 +231,7 @@ class ResultStore(AbstractContextManager["ResultStore"]):
             return tuple(self._make_record(finished[key]) for key in wanted)
 
     def _make_record(self, run: _Run, rows: TrialRows | None = None) -> TrialRecord:
+        """Return a run as a record; its rows are read unless they are passed."""
         return TrialRecord(
             key=run.key,
             config=run.config,
@@ -275,8 +278,8 @@ class ResultStore(AbstractContextManager["ResultStore"]):
 
     def _run_in_progress(self, key: TrialKey, config: str, version: str) -> _Run:
         """Return the stored run of a key, or insert one without rows."""
-        for run in self._runs(key):
-            return run
+        if runs := self._runs(key):
+            return runs[0]
         checksum = TrialRows(np.zeros(0, ROW)).checksum()
         values = (*_stored(key), config, version, 0, 0.0, None, checksum)
         marks = ", ".join("?" * len(_Run._fields))
@@ -286,12 +289,21 @@ class ResultStore(AbstractContextManager["ResultStore"]):
         return run
 
     def _update(self, run: _Run) -> None:
-        """Update the columns of a run that may change, in SQLite's types: np.float64 as float."""
+        """Update the columns of a run that may change, and their checksum."""
+        # SQLite stores Python's numbers only, not those of NumPy.
         run = run._replace(n_decisions=int(run.n_decisions), seconds=float(run.seconds))
         self._connection.execute(
             "UPDATE runs SET version = ?, n_decisions = ?, seconds = ?, finished_at = ?,"
             " checksum = ?, crc = ? WHERE id = ?",
-            (*run[7:-1], _crc(run[:-1]), run.id),  # `_Run` has the fields from version on last
+            (
+                run.version,
+                run.n_decisions,
+                run.seconds,
+                run.finished_at,
+                run.checksum,
+                _crc(run[:-1]),
+                run.id,
+            ),
         )
 
     def _insert(self, run_id: int, rows: TrialRows) -> None:
@@ -309,8 +321,12 @@ class ResultStore(AbstractContextManager["ResultStore"]):
             raise ChangedRowsError(self.path, run.key, self._make_record(run, rows))
         return rows
 
-    def _hash_before(self, run: _Run, first: int) -> Hash | None:
-        """Delete a run's rows from number ``first`` on; return the hash of the remaining rows."""
+    def _delete_from(self, run: _Run, first: int) -> Hash:
+        """Delete a run's rows from number ``first`` on; return the hash of the remaining rows.
+
+        The remaining rows are read only where their hash is not at hand: after the run was resumed,
+        or if another process has stored rows.
+        """
         hashed = self._hashes.get(run.id)
         later = "FROM rows WHERE run_id = ? AND number >= ?"
         count = self._connection.execute(f"SELECT count(*) {later}", (run.id, first))
@@ -343,10 +359,11 @@ class ResultStore(AbstractContextManager["ResultStore"]):
                     raise StoreError(
                         f"{self.path} is damaged: {place}: a value does not fit its checksum, crc"
                     )
-            return {key: json.loads(content) for of, key, content, _ in rows if of == kind}
+            return {key: json.loads(text) for row_kind, key, text, _ in rows if row_kind == kind}
 
 
 def _crc(values: tuple[object, ...]) -> int:
+    """Return the checksum of a row's other columns, which shows damage to any of them."""
     return zlib.crc32(repr(values).encode("utf-8", "surrogatepass"))
 
 
@@ -368,7 +385,10 @@ def _stored(key: TrialKey) -> TrialKey:
 
 
 def _inspect(path: Path) -> bool:
-    """Return whether an unchanged file is missing or empty; StoreError if damaged or foreign."""
+    """Return whether a file is missing or empty, without changing it.
+
+    StoreError or DatabaseError if it is damaged, or of another program or version.
+    """
     if not is_there(path) or path.stat().st_size == 0:
         return True
     with open_regular(path, MOST_BYTES) as file:
@@ -392,7 +412,8 @@ def _inspect(path: Path) -> bool:
                 f"{path} has schema version {version}, and this version of sdnn reads"
                 f" {SCHEMA_VERSION}: choose another output folder"
             )
-        if objects != _own_objects():  # before any query that a view or a trigger could change
+        # Views and triggers could change the result of any query, so refuse them first.
+        if objects != _own_objects():
             raise sqlite3.DatabaseError("it has other tables, views or triggers")
         (finding,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
         if finding != "ok":
@@ -411,25 +432,6 @@ def _own_objects() -> set[tuple[str | None, ...]]:
     with closing(sqlite3.connect(":memory:")) as connection:
         connection.executescript(_SCHEMA)
         return _objects(connection)
-
-
-def connect(path: Path | None, *, read_only: bool = False) -> sqlite3.Connection:
-    """Open a file, or a database in memory, with SQLite's protection against hostile schemas."""
-    place = ":memory:"
-    if path is not None:
-        place = f"{path.absolute().as_uri()}?mode={'ro' if read_only else 'rwc'}"
-    with ExitStack() as on_error:
-        connection = sqlite3.connect(place, uri=path is not None, timeout=BUSY_SECONDS)
-        on_error.enter_context(closing(connection))
-        for setting in (
-            "trusted_schema = OFF", "cell_size_check = ON", "mmap_size = 0",
-            f"query_only = {int(read_only)}",
-        ):  # fmt: skip
-            connection.execute(f"PRAGMA {setting}")
-        connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MOST_BYTES_OF_VALUE)
-        connection.setlimit(sqlite3.SQLITE_LIMIT_ATTACHED, 0)
-        on_error.pop_all()
-    return connection
 
 
 @contextmanager
