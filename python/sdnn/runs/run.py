@@ -68,7 +68,7 @@ class Goal(BudgetSpec, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.steps is self.episodes is None:
+        if self.steps is None and self.episodes is None:
             raise ConfigError("steps", "or episodes must be given")
 
 
@@ -120,12 +120,8 @@ class Run(Displayed):
 
     def _facts(self) -> dict[str, object]:
         """Return the facts that ``repr`` and notebooks display, by their labels."""
-        return {
-            "folder": self.folder,
-            "task": self.spec.task,
-            "agent": self.spec.label,
-            "seed": self.spec.seed,
-        }
+        spec = self.spec
+        return {"folder": self.folder, "task": spec.task, "agent": spec.label, "seed": spec.seed}
 
     def check(self) -> None:
         """Make environment, agent and training as a check; ConfigError for a wrong setting."""
@@ -140,14 +136,9 @@ class Run(Displayed):
                 "must be true for a run in a folder: without seeds no episode can be repeated,"
                 " which resuming needs. Studies and `sdnn reproduce` run such specifications",
             )
-        trial = self.spec.make_training()
-        try:
-            if self.spec.output.tensorboard:
-                tensorboard_in(self.folder)
-        except ConfigError:
-            trial.close()
-            raise
-        return trial
+        if self.spec.output.tensorboard:
+            tensorboard_in(self.folder)
+        return self.spec.make_training()
 
     def train(
         self,
@@ -171,17 +162,9 @@ class Run(Displayed):
         with ExitStack() as stack:
             stack.enter_context(self._locked())
             remove_abandoned_files(self.folder)
-            if (self.folder / AGENT).exists() and not (self.folder / CHECKPOINT).exists():
-                missing = f"{self.folder} was trained, but has no {CHECKPOINT} to resume from"
-                remedy = f"a new run needs another folder, {AGENT} would be written over"
-                raise RunError(f"{missing}: {remedy}")
+            self._require_checkpoint_of_agent()
             store = stack.enter_context(ResultStore(self.folder))
-            stored = store.keys(unfinished=True)
-            if stored and self.key not in stored:
-                raise RunError(
-                    f"{self.folder / CONFIG} differs from the specification in {STORE_NAME}: undo"
-                    " the edit, or begin a new run with --config and another --out"
-                )
+            self._require_key_in(store)
             checkpoints = _StoredCheckpoints(self, store)
             all_callbacks = [checkpoints, *callbacks]
             if self.spec.output.keep_best:
@@ -205,21 +188,43 @@ class Run(Displayed):
                     if trial.reason != "target":  # "target": reached just before the run was killed
                         training.run()
             except UnusableStepError as error:
-                n_saved, resume = checkpoints.n_saved or began_at, resume_command(self.folder)
-                saved = f"the first {n_saved} steps are saved: {resume} continues there"
-                saved += " with a new episode"
-                if n_saved == 0:
-                    saved = f"nothing is learned yet: {resume} begins again"
-                    saved += " once the environment is fixed"
-                raise RunError(f"{self.spec.task}: {error}; {saved}") from error
+                remedy = self._how_to_continue(checkpoints.n_saved or began_at)
+                raise RunError(f"{self.spec.task}: {error}; {remedy}") from error
             if trial.finished:
                 checkpoints.finish(training)
             if signals.received == signal.SIGTERM:
                 raise RunTerminatedError(f"terminated after {training.n_steps} steps")
             if signals.received is not None:
                 raise KeyboardInterrupt
-            agent, env = training.agent, training.env
-            agent.save(self.folder / AGENT)
+            training.agent.save(self.folder / AGENT)
+        return self._outcome(trial)
+
+    def _require_checkpoint_of_agent(self) -> None:
+        """Raise RunError where training would overwrite an agent from which it cannot resume."""
+        if (self.folder / AGENT).exists() and not (self.folder / CHECKPOINT).exists():
+            missing = f"{self.folder} was trained, but has no {CHECKPOINT} to resume from"
+            remedy = f"a new run needs another folder, {AGENT} would be written over"
+            raise RunError(f"{missing}: {remedy}")
+
+    def _require_key_in(self, store: ResultStore) -> None:
+        """Raise RunError if the stored rows are those of another specification or seed."""
+        stored = store.keys(unfinished=True)
+        if stored and self.key not in stored:
+            raise RunError(
+                f"{self.folder / CONFIG} differs from the specification in {STORE_NAME}: undo"
+                " the edit, or begin a new run with --config and another --out"
+            )
+
+    def _how_to_continue(self, n_saved: int) -> str:
+        """Return the end of a message about an unusable step, after ``n_saved`` saved steps."""
+        resume = resume_command(self.folder)
+        if n_saved == 0:
+            return f"nothing is learned yet: {resume} begins again once the environment is fixed"
+        return f"the first {n_saved} steps are saved: {resume} continues there with a new episode"
+
+    def _outcome(self, trial: TrainingTrial) -> RunOutcome:
+        """Return the result of a trial that has ended: reached its goal, or was stopped."""
+        training, agent, env = trial.training, trial.training.agent, trial.training.env
         evaluations = (row for row in reversed(self.rows()) if row["kind"] == "evaluation")
         last = next(evaluations, None)
         has_report = isinstance(agent, ValueAgent) and not agent.is_warming_up
@@ -282,7 +287,8 @@ class Run(Displayed):
     @property
     def fresh_seed(self) -> int:
         """A seed for evaluations whose episodes differ from all episodes of the run."""
-        return (self.spec.seed + 2**63) % 2**64  # half of all seeds apart
+        # Half of all seeds away: users choose small ones, so it is hardly that of another run.
+        return (self.spec.seed + 2**63) % 2**64
 
     @property
     def key(self) -> TrialKey:
@@ -305,7 +311,9 @@ class Run(Displayed):
         values: dict[str, object] = {"format": FORMAT, "version": __version__, **self.spec.values()}
         if self.goals:
             goals = map(msgspec.structs.asdict, self.goals)
-            values["goals"] = [{k: v for k, v in goal.items() if v is not None} for goal in goals]
+            values["goals"] = [
+                {key: v for key, v in goal.items() if v is not None} for goal in goals
+            ]
         write_whole(self.folder / CONFIG, (json.dumps(values, indent=2) + "\n").encode())
 
     @contextmanager
@@ -341,7 +349,7 @@ class Run(Displayed):
             raise RunError(str(error)) from error
 
     def _set_goal(self, training: Training, goal: dict[str, int | None]) -> None:
-        """Save a new goal, first in the checkpoint, which decides, then in the configuration."""
+        """Save a new goal in the checkpoint, with which a training resumes, then in the file."""
         for name, value in goal.items():
             done: int = getattr(training, f"n_{name}")
             if value is not None and value < done:
