@@ -29,7 +29,7 @@ from sdnn.training.loop import Row
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
 
-WINDOW = 20  # episodes in the running median of the returns, or all if there are fewer
+WINDOW = 20  # episodes in the running median of the returns; at first there are fewer
 
 MAX_POINTS = 500  # the most points of a running median over several runs
 
@@ -70,28 +70,40 @@ def groups_of(runs: Sequence[Run]) -> list[Group]:
 
     Labels of tasks and agents contain the settings in which groups differ.
     """
-    members: dict[tuple[tuple[str, str], ...], list[Run]] = {}
+    members: dict[_Settings, list[Run]] = {}
     for run in runs:
-        settings = {"goals": ", then ".join(_goal_labels(run))}
-        for key, value in leaves(run.spec.full_values()):
-            if value != {} and key not in _IGNORED and not key.startswith("output."):
-                settings[key] = value if isinstance(value, str) else json.dumps(value)
-        members.setdefault(tuple(sorted(settings.items())), []).append(run)
+        members.setdefault(_settings_of(run), []).append(run)
     groups = []
-    for key_values, group_runs in members.items():
+    for settings, group_runs in members.items():
         spec = group_runs[0].spec
-        task, agent = [spec.task], [f"{spec.agent.name} {spec.agent.preset or ''}".strip()]
         same_task = [
-            (dict(s), r[0].spec) for s, r in members.items() if r[0].spec.task == spec.task
+            (dict(others), runs[0].spec.label)
+            for others, runs in members.items()
+            if runs[0].spec.task == spec.task
         ]
-        for key, value in key_values:  # a label has the settings in which other groups differ
+        task, agent = [spec.task], [f"{spec.agent.name} {spec.agent.preset or ''}".strip()]
+        for key, value in settings:
             is_of_task = key.startswith("environment.")
-            others = (s for s, other in same_task if is_of_task or other.label == spec.label)
+            # Agents are compared with those of their own label only.
+            others = [s for s, label in same_task if is_of_task or label == spec.label]
             if any(other.get(key) != value for other in others):
                 word = value if key == "goals" else f"{key.rpartition('.')[2]}={value}"
                 (task if is_of_task else agent).append(word)
         groups.append(Group(task=", ".join(task), agent=", ".join(agent), runs=tuple(group_runs)))
     return groups
+
+
+_Settings: TypeAlias = tuple[tuple[str, str], ...]
+"""Settings of a run, but for its seed and output: sorted pairs of key and value as text."""
+
+
+def _settings_of(run: Run) -> _Settings:
+    """Return the settings that runs of a group share, with the goals under the key "goals"."""
+    settings = {"goals": ", then ".join(_goal_labels(run))}
+    for key, value in leaves(run.spec.full_values()):
+        if value != {} and key not in _IGNORED and not key.startswith("output."):
+            settings[key] = value if isinstance(value, str) else json.dumps(value)
+    return tuple(sorted(settings.items()))
 
 
 def environments_of(runs: Sequence[Run]) -> dict[str, EnvironmentSpec]:
@@ -100,7 +112,11 @@ def environments_of(runs: Sequence[Run]) -> dict[str, EnvironmentSpec]:
 
 
 def _goal_labels(run: Run) -> Iterator[str]:
-    """Describe a run's goals; later goals with the step at which the user has set them."""
+    """Describe a run's goals: "9000 steps", later ones with their start, "from 500 on 9000 steps".
+
+    The start is the step at which the user has set the goal; it is left out where the goal before
+    had ended there.
+    """
     budget = run.spec.budget
     yield f"{budget.episodes} episodes" if budget.steps is None else f"{budget.steps} steps"
     end = None if budget.target_return is not None else budget.steps  # of the goal before, if known
@@ -183,10 +199,10 @@ def _curves_of_group(group: Group) -> tuple[list[Curve], list[str]]:
 
 
 def _running_medians(group: Group, episodes: Mapping[Run, Series]) -> Iterator[Curve]:
-    """Yield the running median of a run's returns, or the median over runs of theirs.
+    """Yield the running median of a single run's returns, or the median over several runs.
 
-    Between the ends of its episodes a run has its last value. None is yielded where runs have no
-    step in common.
+    Runs end episodes at different steps: between two of its episodes, a run keeps the value of the
+    earlier one. No curve is yielded where runs have no range of steps in common.
     """
     medians = {run: _running_median(values) for run, (_, values) in episodes.items()}
     if len(episodes) < 2:
@@ -196,7 +212,7 @@ def _running_medians(group: Group, episodes: Mapping[Run, Series]) -> Iterator[C
     all_steps = [steps for steps, _ in episodes.values()]
     first, last = max(steps[0] for steps in all_steps), min(steps[-1] for steps in all_steps)
     union = np.unique(np.concatenate(all_steps))
-    grid = union[(union >= first) & (union <= last)]
+    grid = union[(union >= first) & (union <= last)]  # where every run has a value
     if not len(grid):
         return
     grid = grid[np.unique(np.linspace(0, len(grid) - 1, MAX_POINTS).astype(int))]
@@ -306,10 +322,10 @@ def _draw_curve(axes: Axes, curve: Curve, color: str) -> None:
 
 
 def _look(kind: Kind, n_points: int = 0) -> dict[str, object]:
-    """Return matplotlib's properties of a curve; very many points become a picture in SVG files."""
+    """Return matplotlib's properties of a curve, of the names that `Artist.update` expects."""
     if kind == "return":
-        is_picture = n_points > _MANY_POINTS
-        return {"ls": "", "marker": ".", "ms": 2.5, "alpha": 0.3, "rasterized": is_picture}
+        has_many_points = n_points > _MANY_POINTS
+        return {"ls": "", "marker": ".", "ms": 2.5, "alpha": 0.3, "rasterized": has_many_points}
     if kind == "running median":
         return {"ls": "--", "lw": 1.2}
     return {"ls": "-", "lw": 1.8, "marker": "o", "ms": 3}

@@ -41,7 +41,10 @@ PROBE_EPISODES = 10  # few, but they use every part of the agent and the task
 MOST_SUBMISSIONS = 3  # a trial that was lost this often has failed
 
 MISMATCH = f"__import__({__name__!r}, fromlist=['mismatch']).mismatch(version, probes)"
-"""Expression for `eval`: workers without this library can evaluate it, and report the error."""
+"""Expression that workers evaluate, with ``version`` and ``probes``.
+
+Pickling the function itself would fail on workers without this library, before they could answer.
+"""
 
 
 def probe(planned: PlannedTrial) -> str:
@@ -61,9 +64,10 @@ def probe(planned: PlannedTrial) -> str:
 
 def probes_of(planned: Sequence[PlannedTrial]) -> list[tuple[bytes, str]]:
     """Pickle one trial per agent with its `probe`; ClusterError if one cannot be pickled."""
-    kinds = {(trial.key.agent, trial.spec.is_compiled): trial for trial in reversed(planned)}
+    # Of each agent the first trial in the plan, since later ones are replaced.
+    examples = {(trial.key.agent, trial.spec.is_compiled): trial for trial in reversed(planned)}
     try:
-        return [(pickle.dumps(trial), probe(trial)) for trial in kinds.values()]
+        return [(pickle.dumps(trial), probe(trial)) for trial in examples.values()]
     except Exception as error:  # settings of a user's agent may raise anything
         raise ClusterError(f"trials cannot be sent to workers: {error}") from error
 
@@ -83,16 +87,16 @@ def run_on_worker(planned: PlannedTrial) -> TrialRecord:
 
     worker = get_worker()
     key = worker.get_current_task()
-    reported = time.monotonic()
-    with closing(run_to_end(planned)) as happening:
-        for message in happening:
+    reported_at = time.monotonic()
+    with closing(run_to_end(planned)) as messages:
+        for message in messages:
             if isinstance(message, Finished):
                 return message.record
             task = worker.state.tasks.get(key)
             if task is None or task.state != "executing":
                 break
-            if time.monotonic() - reported >= PROGRESS_SECONDS:
-                reported = time.monotonic()
+            if time.monotonic() - reported_at >= PROGRESS_SECONDS:
+                reported_at = time.monotonic()
                 worker.log_event(PROGRESS_TOPIC, (key, message.episode))
     raise Reschedule
 
@@ -147,7 +151,7 @@ class DaskExecutor:
 
         end = time.monotonic() + self.scheduler_timeout
         attempt = min(CONNECT_SECONDS, self.scheduler_timeout)
-        waits = False
+        is_waiting = False
         while not stop.is_set():
             try:
                 return Client(self._address(), timeout=attempt, set_as_default=False)
@@ -157,9 +161,9 @@ class DaskExecutor:
             except ValueError as error:
                 expected = f"an address or a scheduler file, got {self.scheduler} ({error})"
                 raise ClusterError(f"scheduler must be {expected}") from error
-            if not waits:
+            if not is_waiting:
                 yield [Noted(f"waiting for the scheduler at {self.scheduler}")]
-            waits = True
+            is_waiting = True
             stop.wait(WORKERS_SECONDS)
         return None
 
@@ -185,10 +189,10 @@ Key: TypeAlias = tuple[str | int, ...]
 
 
 class _Placed(NamedTuple):
-    """A submitted trial: the number of its submission, and the workers it may run on."""
+    """A submitted trial: the number of its submission, from 1, and the workers it may run on."""
 
     planned: PlannedTrial
-    n: int
+    submission: int
     workers: frozenset[str]
     future: Future
 
@@ -202,11 +206,12 @@ class _Run:
         self.executor = executor
         self.client = client
         self.probes = probes_of(planned)
-        self.waiting = deque((trial, 1) for trial in planned)  # trials and numbers of submissions
+        # Trials to be submitted, each with the number of this submission.
+        self.waiting = deque((trial, 1) for trial in planned)
         self.placed: dict[Key, _Placed] = {}  # submitted trials by Dask's key
         self.threads: dict[str, int] = {}  # number of threads of each admitted worker
         self.problems: dict[str, str] = {}  # why a worker gets no trials; "" if it is admitted
-        self.unserved_since: float | None = None
+        self.unserved_since: float | None = None  # since when no worker is admitted
 
     def messages(self, stop: Event) -> Generator[Sequence[Message], None, None]:
         """Run until every trial is finished or failed, or `stop` is set."""
@@ -220,24 +225,18 @@ class _Run:
             if time.monotonic() - updated_at > WORKERS_SECONDS:
                 updated_at = time.monotonic()
                 yield list(self.update_workers())
-            begun = []
-            while self.waiting and len(self.placed) < sum(self.threads.values()):
-                planned, n = self.waiting.popleft()
-                # The key is the trial's identity, so that several drivers share it. The number of
-                # the submission is part of it, because Dask never runs a key again.
-                # Dask keeps statistics of each group of keys, which is a tuple's first element.
-                key = ("sdnn", _core.__version__, *planned.key, n)
-                workers = list(self.threads)
-                future = self.client.submit(run_on_worker, planned, key=key, workers=workers)
-                self.placed[key] = _Placed(planned, n, frozenset(workers), future)
-                completed.add(future)
-                begun.append(Advanced(planned, 0))
-            yield begun
+            submitted = list(self._submit_waiting())
+            for placed in submitted:
+                completed.add(placed.future)
+            yield [Advanced(placed.planned, 0) for placed in submitted]
             if stop.wait(RESULTS_SECONDS):
                 return
-            reports = (progress.get() for _ in range(progress.qsize()))
-            placed = self.placed
-            yield [Advanced(placed[key].planned, n) for key, n in reports if key in placed]
+            reports = [progress.get() for _ in range(progress.qsize())]
+            yield [
+                Advanced(self.placed[key].planned, episode)
+                for key, episode in reports
+                if key in self.placed
+            ]
             batch: list[Message] = []
             try:
                 for future, result in completed.next_batch(block=False):
@@ -246,34 +245,67 @@ class _Run:
             finally:  # an error ends the run, and what was finished before it is stored
                 yield batch
 
+    def _submit_waiting(self) -> Generator[_Placed, None, None]:
+        """Submit waiting trials, as many as the threads of admitted workers can run at once."""
+        while self.waiting and len(self.placed) < sum(self.threads.values()):
+            planned, submission = self.waiting.popleft()
+            # The key is the trial's identity, so that several drivers share it. The number of
+            # the submission is part of it, because Dask never runs a key again.
+            # Dask keeps statistics of each group of keys, which is a tuple's first element.
+            key = ("sdnn", _core.__version__, *planned.key, submission)
+            workers = list(self.threads)
+            future = self.client.submit(run_on_worker, planned, key=key, workers=workers)
+            self.placed[key] = _Placed(planned, submission, frozenset(workers), future)
+            yield self.placed[key]
+
     def update_workers(self) -> Generator[Message, None, None]:
-        """Admit new workers with the same build; resubmit trials whose workers are all lost."""
+        """Admit new workers with the same build; resubmit trials whose workers are all lost.
+
+        ClusterError if there has been no fitting worker for too long.
+        """
         client = self.client
         threads = client.sync(client.scheduler.ncores, callback_timeout=ANSWER_SECONDS)
         self.problems = {worker: why for worker, why in self.problems.items() if worker in threads}
-        answers: dict[str, str | BaseException] = {}
-        if new := [worker for worker in threads if worker not in self.problems]:
-            build = {"version": _core.__version__, "probes": self.probes}
-            answers = client.run(eval, MISMATCH, build, workers=new, on_error="return")
+        yield from self._check_workers([w for w in threads if w not in self.problems])
+        self.threads = {
+            worker: n for worker, n in threads.items() if self.problems.get(worker) == ""
+        }
+        yield from self._resubmit_lost()
+        yield from self._await_workers()
+
+    def _check_workers(self, workers: list[str]) -> Generator[Noted, None, None]:
+        """Note in `problems` whether new workers have the same build; report those that do not."""
+        if not workers:
+            return
+        build = {"version": _core.__version__, "probes": self.probes}
+        answers: dict[str, str | BaseException] = self.client.run(
+            eval, MISMATCH, build, workers=workers, on_error="return"
+        )
         for worker, answer in answers.items():
             if isinstance(answer, OSError):  # the worker was lost meanwhile
                 continue
             if isinstance(answer, BaseException):
                 answer = f"it cannot run these trials: {type(answer).__name__}: {answer}"
-            self.problems[worker] = answer and f"worker {worker} was refused, {answer}"
+            self.problems[worker] = ""
             if answer:
+                self.problems[worker] = f"worker {worker} was refused, {answer}"
                 yield Noted(self.problems[worker])
-        self.threads = {
-            worker: n for worker, n in threads.items() if self.problems.get(worker) == ""
-        }
-        for key, (trial, n, workers, future) in list(self.placed.items()):
-            if workers.isdisjoint(self.threads):
-                del self.placed[key]
-                future.cancel()
-                if n < MOST_SUBMISSIONS:
-                    self.waiting.appendleft((trial, n + 1))
-                else:
-                    yield Failed(trial, WorkerLostError(f"all its workers were lost, {n} times"))
+
+    def _resubmit_lost(self) -> Generator[Failed, None, None]:
+        """Let trials wait again whose workers are all lost; report those lost too often."""
+        for key, (trial, submission, workers, future) in list(self.placed.items()):
+            if not workers.isdisjoint(self.threads):
+                continue
+            del self.placed[key]
+            future.cancel()
+            if submission < MOST_SUBMISSIONS:
+                self.waiting.appendleft((trial, submission + 1))
+            else:
+                problem = f"all its workers were lost, {submission} times"
+                yield Failed(trial, WorkerLostError(problem))
+
+    def _await_workers(self) -> Generator[Noted, None, None]:
+        """Report that there is no fitting worker; ClusterError if there is none for too long."""
         scheduler, seconds = self.executor.scheduler, self.executor.scheduler_timeout
         if self.threads:
             self.unserved_since = None

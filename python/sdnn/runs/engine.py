@@ -8,6 +8,7 @@ lock while it advances, so threads scale over the cores.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable, Generator, Iterable, Sequence
@@ -53,7 +54,7 @@ class PlannedTrial:
 
 
 class Begun(NamedTuple):
-    """The run begins, with this number of learning episodes to do."""
+    """The run begins, with ``n_episodes`` to learn, or steps where budgets count these."""
 
     n_planned: int
     n_reused: int
@@ -61,7 +62,7 @@ class Begun(NamedTuple):
 
 
 class Advanced(NamedTuple):
-    """Number of learning episodes that a trial has done: 0 at first, and whenever it restarts."""
+    """Learning episodes, or the budget's steps, that a trial has done; 0 as it starts."""
 
     planned: PlannedTrial
     episode: int
@@ -176,7 +177,7 @@ class TrialsOutcome:
 def _work_of(spec: RunSpec) -> int:
     """Return an estimate of a trial's operations, to compare it with others of its study."""
     if not spec.is_compiled or spec.entry.step_work is None:
-        return spec.length
+        return spec.length  # no estimate per step
     return spec.length * spec.entry.step_work(spec.core_settings()["approximator"])
 
 
@@ -225,7 +226,7 @@ def run_trials(
             if finished:
                 with store.together():
                     add(finished)
-        except StoreError:  # nothing of the batch is stored: add those before the faulty trial
+        except StoreError:  # none is stored: add those before the refused one, which raises again
             add(finished)
         n_run += len(finished)
 
@@ -362,16 +363,16 @@ def teams_of(planned: Iterable[PlannedTrial], jobs: int) -> Iterable[list[Planne
     by_task: dict[object, list[PlannedTrial]] = {}
     for trial in planned:
         spec = trial.spec
-        task: object = trial.key
+        task: object = trial.key  # shared with no other trial
         if spec.entry.advances_together and spec.entry.table_bytes and spec.is_compiled:
             approximator = spec.core_settings()["approximator"]
             if spec.entry.table_bytes(approximator) <= MOST_TABLE_BYTES:
                 task = spec.agent.name, spec.environment.paper_settings().acrobot
         by_task.setdefault(task, []).append(trial)
     teams = []
-    for alike in by_task.values():
-        size = min(MOST_TOGETHER, -(-len(alike) // jobs))
-        teams += [alike[k : k + size] for k in range(0, len(alike), size)]
+    for similar in by_task.values():
+        size = min(MOST_TOGETHER, math.ceil(len(similar) / jobs))
+        teams += [similar[first : first + size] for first in range(0, len(similar), size)]
     return sorted(teams, key=lambda team: _minus_work(*team))
 
 
@@ -393,7 +394,7 @@ class ThreadExecutor:
             try:
                 for team in teams_of(planned, self.jobs):
                     pool.submit(_run_team, team, messages, stop)
-                # The last message of every trial is Finished, Failed, or None if it was abandoned.
+                # Every trial ends with a message: Finished, Failed, or None if it was abandoned.
                 n_open = len(planned)
                 while n_open:
                     batch = [messages.get(), *(messages.get() for _ in range(messages.qsize()))]

@@ -186,30 +186,38 @@ class EnvironmentSpec(Settings, frozen=True):
                 except ValueError as error:
                     raise ConfigError("environment.action_masks", f"{self.id}: {error}") from error
             low, high = self.ends(env)
-            if not self.has_other_sensors:
-                return env
-            space = env.observation_space
-            if not isinstance(space, gym.spaces.Box) or low.shape != space.shape:
-                env = gym.wrappers.FlattenObservation(env)
-            unknown = np.flatnonzero(~(np.isfinite(low) & np.isfinite(high)))
-            if unknown.size:
-                variables = ", ".join(map(str, unknown))
-                raise ConfigError(
-                    f"environment.ranges.{unknown[0]}",
-                    "must be given, as lowest and highest value: noise and redundant need the range"
-                    f" of every variable, and {self.id} has none of variables {variables} of"
-                    f" {low.size} (from 0)",
-                )
-            env = UnitSensors(env, low, high)
-            if self.redundant:
-                pairs = neighbours(low.size, self.redundant)
-                env = RedundantSensors(env, [partial(mean_of, *pair) for pair in pairs])
-            if self.noise:
-                env = NoisySensors(env, self.noise, edge="saturate", stream=stream)
-            return in_own_units(env, low, high) if self.own_units else env
+            return self._with_sensors(env, low, high, stream) if self.has_other_sensors else env
         except BaseException:
             env.close()
             raise
+
+    def _with_sensors(
+        self, env: Env, low: NDArray[np.float64], high: NDArray[np.float64], stream: NoiseStream
+    ) -> Env:
+        """Return the environment with scaled, redundant and noisy sensors, by wrappers in order.
+
+        ``low`` and ``high`` are the limits of the flattened observation, (n_variables,);
+        ConfigError if one is not finite.
+        """
+        space = env.observation_space
+        if not isinstance(space, gym.spaces.Box) or low.shape != space.shape:
+            env = gym.wrappers.FlattenObservation(env)
+        unknown = np.flatnonzero(~(np.isfinite(low) & np.isfinite(high)))
+        if unknown.size:
+            variables = ", ".join(map(str, unknown))
+            raise ConfigError(
+                f"environment.ranges.{unknown[0]}",
+                "must be given, as lowest and highest value: noise and redundant need the range"
+                f" of every variable, and {self.id} has none of variables {variables} of"
+                f" {low.size} (from 0)",
+            )
+        env = UnitSensors(env, low, high)
+        if self.redundant:
+            pairs = neighbours(low.size, self.redundant)
+            env = RedundantSensors(env, [partial(mean_of, *pair) for pair in pairs])
+        if self.noise:
+            env = NoisySensors(env, self.noise, edge="saturate", stream=stream)
+        return in_own_units(env, low, high) if self.own_units else env
 
     def imported(self) -> bool:
         """Import the module that ``id`` names; return whether a module was imported now.
@@ -252,8 +260,9 @@ class EnvironmentSpec(Settings, frozen=True):
         return Scaling(ranges=tuple(pairs), n_redundant=self.redundant)
 
     def ends(self, env: Env) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the limits of the flattened observation's variables; infinite where not known.
+        """Return low and high limits of the flattened observation's variables, (n_variables,) each.
 
+        They are those of ``ranges``, else of the observation space: infinite where not known.
         ConfigError if a range is given of a variable that is not there, or observations are no
         vector.
         """
@@ -292,8 +301,8 @@ class EnvironmentSpec(Settings, frozen=True):
                 self._make_unwrapped(stream, None).close()
                 raise RunError(_problem_of_render_mode(self.id, render_mode)) from error
             problem = f"{self.id} cannot be made: {type(error).__name__}: {error}"
-            other = "environment.kwargs" if self.kwargs else "environment.id"
-            raise ConfigError(self.key_of(blamed(error)[0]) or other, problem) from error
+            default_key = "environment.kwargs" if self.kwargs else "environment.id"
+            raise ConfigError(self.key_of(blamed(error)[0]) or default_key, problem) from error
 
     def key_of(self, argument: str) -> str:
         """Return the key of an argument of the environment, or "" for an unknown name."""
@@ -326,7 +335,7 @@ class SeedFirstReset(gym.Wrapper[object, object, object, object]):
         self._seed: int | None = seed
 
     def reset(self, *, seed: int | None = None, options: Data | None = None) -> tuple[object, Data]:
-        """Reset the environment."""
+        """Reset the environment; the first reset without a seed gets that of the constructor."""
         if seed is None:
             seed, self._seed = self._seed, None
         return super().reset(seed=seed, options=options)
@@ -344,8 +353,8 @@ def search_folder(folder: Path) -> None:
 def find_module(name: str) -> None:
     """Add the folders of `search_folder` to ``sys.path`` if a module is nowhere else.
 
-    Only modules that a user names are searched there: otherwise, any file in the folder could
-    replace a missing package.
+    The folders are not on the path from the beginning, since any file in them could then take the
+    place of a missing package.
     """
     package = name.partition(".")[0]
     if package and package not in sys.modules and importlib.util.find_spec(package) is None:
@@ -358,4 +367,5 @@ def render_modes(env: Env) -> tuple[str, ...]:
 
 
 def _problem_of_render_mode(name: str, render_mode: str) -> str:
+    """Return the message about an environment that lacks a render mode."""
     return f"{name} cannot be rendered as pictures ({render_mode})"
