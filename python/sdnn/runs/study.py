@@ -31,7 +31,11 @@ from sdnn.support.arguments import whole
 from sdnn.support.toml import KeyPath
 
 MIN_TRIALS_TO_DIFFER = 6
-"""With fewer pairs, all differences have the same sign by chance in over 5 % of the cases."""
+"""Pairs of trials without which no difference is claimed.
+
+If variants are equal, all of n differences have the same sign with probability 2 * 0.5**n: 6 % of 5
+pairs, 3 % of 6.
+"""
 
 
 class Setting(NamedTuple):
@@ -83,13 +87,14 @@ class Combination(NamedTuple):
 class Study:
     """Variants in cases; `sdnn.runs.study_file.StudyFile` reads one from its file.
 
-    ``specs`` are each variant in each case in which it runs, what is run of it, and the settings of
-    a file that made it. The seed of a trial depends on the root ``seed``, its case and its number
-    only, so that variants can be compared trial by trial: with that of the id ``reference``.
+    ``specs`` lists each variant in each case in which it runs, with the specification that is run
+    and the settings of a file that made it. The seed of a trial depends on the root ``seed``, its
+    case and its number only, so that variants can be compared trial by trial, with the variant
+    whose id is ``reference``.
 
-    ``combinations`` has every variant in every case in which it runs, by their ids (case, variant);
-    ``pairs`` are the ids of those that are to be run: all by default. What is stored of others is
-    shown, too. ``cases`` and ``variants`` are in the order in which they are first named.
+    ``combinations`` holds them by their ids (case, variant). ``pairs`` are the ids of those that
+    are to be run, by default all; the report shows stored trials of others, too. ``cases`` and
+    ``variants`` are in the order in which they are first named.
     """
 
     source, text = "", ""  # name and content of the study's file
@@ -109,10 +114,12 @@ class Study:
         whole("n_trials", n_trials, 0, 10**6)
         for case, variant, spec, settings in specs:
             label, config_hash = spec.label, spec.config_hash
-            seeds = (trial_seed(seed, case.id, number) for number in range(n_trials))
-            keys = (TrialKey(case.id, label, *pair, config_hash) for pair in enumerate(seeds))
-            trials = tuple(PlannedTrial(key, spec) for key in keys)
-            combination = Combination(case, variant, spec, settings, trials)
+            trials = []
+            for number in range(n_trials):
+                seed_of_trial = trial_seed(seed, case.id, number)
+                key = TrialKey(case.id, label, number, seed_of_trial, config_hash)
+                trials.append(PlannedTrial(key, spec))
+            combination = Combination(case, variant, spec, settings, tuple(trials))
             self.combinations.setdefault((case.id, variant.id), combination)
         self.pairs = tuple(self.combinations)
         combinations = self.combinations.values()
@@ -156,9 +163,13 @@ class Study:
         keys_of: dict[str, list[TrialKey]] = {variant.id: [] for variant in self.variants}
         for case, variant in self.combinations:
             keys_of[variant].append(self.keys(case, variant)[0])
-        variants: dict[tuple[TrialKey, ...], str] = {}
-        first_of = {name: variants.setdefault(tuple(keys), name) for name, keys in keys_of.items()}
-        return {name: first for name, first in first_of.items() if first != name}
+        copies: dict[str, str] = {}
+        first_by_keys: dict[tuple[TrialKey, ...], str] = {}
+        for variant, keys in keys_of.items():
+            first = first_by_keys.setdefault(tuple(keys), variant)
+            if first != variant:
+                copies[variant] = first
+        return copies
 
     def check(self, stored: Collection[TrialKey] = ()) -> None:
         """Make a trial of every specification, so that an impossible one is found before any runs.

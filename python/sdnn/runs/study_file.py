@@ -9,8 +9,6 @@ import math
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
-from functools import reduce
-from operator import or_
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, TypeAlias
 
@@ -132,12 +130,8 @@ class StudyFile(Study):
         except ConfigError as error:
             raise self.file.located(error) from error
         known = [variant.id for variant in variants]
-        default = next((name for name in (DEFAULT, BASE) if name in known), known[0])
-        reference = default if header.reference is None else header.reference
-        if reference not in known:
-            problem = f"no variant {reference!r}; {advice(reference, known)}"
-            raise self.file.error(("study", "reference"), problem)
-        variants = tuple(sorted(variants, key=lambda variant: variant.id != reference))
+        reference = self._reference(known)
+        variants = tuple(sorted(variants, key=lambda v: v.id != reference))  # it is the first
         pairs = [
             (case, variant)
             for case, variant in itertools.product(cases, variants)
@@ -148,8 +142,7 @@ class StudyFile(Study):
             raise self.file.error(("variants",), problem)
         n_trials = header.trials if n_trials is None else n_trials
         if n_trials * len(pairs) > MOST_TRIALS:
-            number = f"{n_trials} of {len(pairs)} each"
-            problem = f"must be at most {MOST_TRIALS} in all, got {number}"
+            problem = f"must be at most {MOST_TRIALS} in all, got {n_trials} of {len(pairs)} each"
             raise self.file.error(("study", "trials"), problem)
         super().__init__(
             header.title or path.stem,
@@ -163,6 +156,16 @@ class StudyFile(Study):
             if name not in known:
                 raise ValueError(f"no variant {name!r}; {advice(name, known)}")
         self.pairs = tuple(pair for pair in self.pairs if not only or pair[1] in only)
+
+    def _reference(self, known: Sequence[str]) -> str:
+        """Return the id of the variant that others are compared with; ConfigError if unknown."""
+        reference = self.tables.study.reference
+        if reference is None:
+            return next((name for name in (DEFAULT, BASE) if name in known), known[0])
+        if reference not in known:
+            problem = f"no variant {reference!r}; {advice(reference, known)}"
+            raise self.file.error(("study", "reference"), problem)
+        return reference
 
     def additions(self, comparison: Comparison) -> Addition:
         """Make the additions to the report."""
@@ -181,14 +184,15 @@ class StudyFile(Study):
 
         ConfigError if a setting is unknown, has the wrong type or conflicts with another.
         """
-        layers = (case.settings, variant.settings, variant.case_settings.get(case.id, {}))
-        settings = reduce(or_, (self.base, *layers))
+        layers = case.settings | variant.settings | variant.case_settings.get(case.id, {})
+        settings = self.base | layers
         try:
+            # These settings name the agent, whose table [agents.LABEL] comes before them.
             label = self._values(case, settings).get("agent", {}).get("name", DEFAULT_AGENT)
-            agents: list[Layer] = []
             with suppress(ValueError):  # an unknown agent: the specification raises a clearer error
-                agents = [self.agents.get(name, {}) for name in (split_label(label)[0], label)]
-            settings = reduce(or_, (self.base, *agents, *layers))
+                agent_id, _ = split_label(label)
+                of_agent = self.agents.get(agent_id, {}) | self.agents.get(label, {})
+                settings = self.base | of_agent | layers
             return RunSpec.from_values(self._values(case, settings)), settings
         except ConfigError as error:
             raise self.refusal(case, variant, settings, error) from error
@@ -208,18 +212,24 @@ class StudyFile(Study):
         """Make the error about a variant in a case, at the setting that has the error's key."""
         text = f"{error.problem} (case {case.id}, variant {variant.id})"
         name = tuple(error.key.partition("[")[0].split("."))
-        for key in (name, *settings):
-            if key in settings and (key[: len(name)] == name or name[: len(key)] == key):
-                return self.file.error(settings[key].where, text)
-        near = [setting.where for key, setting in settings.items() if key[0] == name[0]]
-        where = next(iter(near), variant.where or case.where)
+        if name in settings:
+            return self.file.error(settings[name].where, text)
+        for key, setting in settings.items():  # within the key, or a table around it
+            if key[: len(name)] == name or name[: len(key)] == key:
+                return self.file.error(setting.where, text)
+        same_table = (setting.where for key, setting in settings.items() if key[0] == name[0])
+        where = next(same_table, variant.where or case.where)
         return ConfigError(error.key, text, self.file.place(where))
 
     def _layer(
         self, where: KeyPath, table: Mapping[str, object], prefix: tuple[str, ...] = (),
         layer: Layer | None = None,
     ) -> Layer:  # fmt: skip
-        """Return the settings of a table, whose keys may be nested, dotted, or quoted with dots."""
+        """Return the settings of a table, whose keys may be nested, dotted, or quoted with dots.
+
+        ``where`` is the table's place in the file. Nested tables are added to ``layer`` by calls of
+        this function, under the keys that begin with ``prefix``.
+        """
         layer = {} if layer is None else layer
         for key, value in table.items():
             name, place = (*prefix, *key.split(".")), (*where, key)
@@ -341,8 +351,11 @@ class StudyFile(Study):
         axes = self._layer(("axes",), table)
         if not axes:
             return
-        counts = Counter(name[-1] for name in axes)  # a last name of several axes is ambiguous
-        values = [list(self._axis_values(axes[name], name, counts)) for name in axes]
+        n_axes_by_name = Counter(name[-1] for name in axes)
+        values = [
+            list(self._axis_values(axis, name, is_ambiguous=n_axes_by_name[name[-1]] > 1))
+            for name, axis in axes.items()
+        ]
         if combine == "product":
             if math.prod(map(len, values)) > MOST_COMBINATIONS:
                 problem = f"must give at most {MOST_COMBINATIONS} combinations"
@@ -358,13 +371,16 @@ class StudyFile(Study):
             yield StudyVariant(label, label, layer, setting.where)
 
     def _axis_values(
-        self, axis: Setting, name: tuple[str, ...], counts: Mapping[str, int]
+        self, axis: Setting, name: tuple[str, ...], *, is_ambiguous: bool
     ) -> Iterator[tuple[str, Layer]]:
-        """Yield a label, such as ``"discount=0.9"``, and the setting for each value of an axis."""
+        """Yield a label, such as ``"discount=0.9"``, and the setting for each value of an axis.
+
+        Where the last part of its name ``is_ambiguous``, labels have the whole name.
+        """
         if not isinstance(axis.value, list) or not axis.value:
             raise self.file.error(axis.where, f"must be an array of values, got {axis.value!r}")
         path = name[:1] if name == ("agent", "name") else name  # "agent=..." is the usual name
-        short_name = path[-1] if counts[name[-1]] == 1 else ".".join(path)
+        short_name = ".".join(path) if is_ambiguous else path[-1]
         texts = (v if isinstance(v, str) else json.dumps(v, default=str) for v in axis.value)
         labels = [f"{short_name}={text}" for text in texts]
         if len(set(labels)) < len(labels):
