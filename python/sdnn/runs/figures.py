@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -26,7 +27,9 @@ _TITLES: dict[MeasureName, str] = {
     "final_return": "mean return at the end",
     "mean_return": "mean return of all tests",
 }
-_OF_STEPS, _OF_RETURNS = tuple(_TITLES)[:2], tuple(_TITLES)[2:]
+_OF_STEPS: tuple[MeasureName, ...] = ("final_share_solved", "episode_of_collapse")
+_OF_RETURNS: tuple[MeasureName, ...] = ("final_return", "mean_return")
+"""The two measures that are drawn of a case, by whether it has those of steps."""
 
 
 def agent_colors(agents: Iterable[str]) -> dict[str, str]:
@@ -70,8 +73,8 @@ def draw_study(comparison: Comparison, footer: str, *, narrow: bool = False) -> 
     """
     cases = comparison.cases
     n_columns = 1 if narrow else min(len(cases), CASES_PER_ROW)
-    n_rows = 2 * -(-len(cases) // n_columns)
-    # Inches that the titles of variants take at the left.
+    n_rows = 2 * math.ceil(len(cases) / n_columns)
+    # Inches at the left for the longest title, by an estimate of the width of a letter.
     title_width = 0.3 + 0.072 * max(len(variant.title) for variant in comparison.variants)
     width = plots.NARROW_WIDTH if narrow else max(6.4, title_width + n_columns * _PANEL_WIDTH)
     panel_height = 1.0 + _LINE_HEIGHT * len(comparison.variants)
@@ -121,7 +124,7 @@ def _draw_case(
                     m.variant.id == reference,
                 )  # fmt: skip
         _label_case(axes, name, max(m.result.last_episode for m in measured))
-        axes.set_ylim(len(lines) - 0.4, -0.6)
+        axes.set_ylim(len(lines) - 0.4, -0.6)  # downwards: the first variant is at the top
         labels = [v.title if with_names else "" for v in comparison.variants]
         axes.set_yticks(range(len(lines)), labels)
         if reference in lines:
@@ -132,20 +135,24 @@ def _draw_variant(
     axes: plots.Axes, measured: Measured, name: MeasureName, line: int, color: str,
     is_reference: bool,
 ) -> None:  # fmt: skip
-    """Draw a measure of a variant on its line: a dot per trial, their median, and its interval."""
+    """Draw a measure of a variant on its line: a dot per trial, their median, and its interval.
+
+    ``line`` is the height of the line, from 0 at the top.
+    """
     result = measured.result
     scale = 100 if name == "final_share_solved" else 1
     values = scale * result.uncensored(name)
     # Dots are spread by rank: equal values lie side by side, and every drawing is the same.
-    order = np.argsort(np.argsort(values, kind="stable"))
-    offsets = np.linspace(-_SPREAD, _SPREAD, values.size)[order] if values.size > 1 else np.zeros(1)
+    ranks = np.argsort(np.argsort(values, kind="stable"))
+    offsets = np.linspace(-_SPREAD, _SPREAD, values.size)[ranks] if values.size > 1 else np.zeros(1)
     axes.scatter(values, line + offsets, s=9, color=color, alpha=0.28, linewidths=0, zorder=2)
     estimate = result.medians[name]
     if name == "final_share_solved":
         # Shares of most trials are near 0 or 1, between which a median would jump: take the mean.
         estimate = estimate_mean(result.values[name])
     value, lower, upper = (
-        scale * (result.last_episode if np.isinf(end) else end) for end in vars(estimate).values()
+        scale * (result.last_episode if np.isinf(number) else number)
+        for number in (estimate.value, estimate.lower, estimate.upper)
     )
     axes.plot([lower, upper], [line, line], color=color, linewidth=1.6, zorder=3)
     is_filled = is_reference or measured.differs(name)

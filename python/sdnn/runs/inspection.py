@@ -153,11 +153,12 @@ class Inspection:
             agent_input = influence.input
             low, high = agent_input.limits(self.states)
             numbers = agent_input.numbers(self.states)
-            met = f"{low:.4g} to {high:.4g}"
-            if self._is_constant(agent_input):
-                met = f"{numbers[0]:.4g}"
             if agent_input.has_symbols:
                 met = f"{len(np.unique(numbers))} of {len(agent_input.columns)} symbols"
+            elif self._is_constant(agent_input):
+                met = f"{numbers[0]:.4g}"
+            else:
+                met = f"{low:.4g} to {high:.4g}"
             use = self.range_use(agent_input)
             rows.append(
                 (
@@ -173,11 +174,11 @@ class Inspection:
                 )
             )
         header = ("input", "type", "range", "met", "used", "outside", "values", "actions", "note")
-        not_empty = [i for i in range(len(header)) if any(row[i] for row in rows)]
+        columns = [i for i in range(len(header)) if any(row[i] for row in rows)]  # with any text
         return Table(
             "Inputs",
-            tuple(header[i] for i in not_empty),
-            [tuple(row[i] for i in not_empty) for row in rows],
+            tuple(header[i] for i in columns),
+            [tuple(row[i] for i in columns) for row in rows],
             brief=("input", "met", "values", "actions", "note"),
         )
 
@@ -194,6 +195,7 @@ class Inspection:
         return RangeUse(low, high, (last - first) / (high - low), outside)
 
     def _is_constant(self, agent_input: AgentInput) -> bool:
+        """Return whether an input has the same value in all states."""
         return bool(np.ptp(agent_input.numbers(self.states)) == 0.0)
 
     def _why_left_out(self, agent_input: AgentInput) -> str:
@@ -217,16 +219,16 @@ class Inspection:
         if threshold is not None:
             numbers.append(("return that counts as solved", f"{threshold:g}"))
         if isinstance(agent, ValueAgent):
-            numbers += [
-                ("epsilon now", f"{agent.epsilon:.4g}"),
-                ("alpha now", f"{agent.learning_rate:.4g}"),
-            ]
+            numbers.append(("epsilon now", f"{agent.epsilon:.4g}"))
+            numbers.append(("alpha now", f"{agent.learning_rate:.4g}"))
         titles = {
             "value_unit": "unit of values", "recent_reward": "size of recent rewards",
             "value_step": "step of values", "mean_error": "mean size of corrections",
             "n_corrections": "corrections",
         }  # fmt: skip
-        numbers += [(title, f"{report[n]:.4g}") for n, title in titles.items() if report.get(n)]
+        for name, title in titles.items():
+            if report.get(name):
+                numbers.append((title, f"{report[name]:.4g}"))
         if report.get("n_corrections"):
             for name in ("share_changed", "share_rounded_away", "share_out_of_range"):
                 numbers.append((name.replace("_", " "), f"{report[name]:.1%}"))
@@ -244,7 +246,8 @@ class Inspection:
         evaluations = [row["mean_return"] for row in self.rows if row["kind"] == "evaluation"]
         if len(evaluations) > 2:
             last, best, worst = evaluations[-1], max(evaluations), min(evaluations)
-            if best - last > 0.5 * (best - worst) > 0.0:  # lost half of the improvement
+            improvement = best - worst
+            if improvement > 0.0 and best - last > 0.5 * improvement:
                 texts.append(
                     f"The last evaluation ({last:.5g}) is far below the best one ({best:.5g}):"
                     " --keep-best keeps that agent."
@@ -286,45 +289,54 @@ class Inspection:
 
     def draw_learning(self, *, narrow: bool = False) -> plots.Figure:
         """Draw returns, and below them epsilon and alpha; `narrow` is a figure for telephones."""
+        agent = self.agent if isinstance(self.agent, ValueAgent) and self.rows else None
+        width = plots.NARROW_WIDTH if narrow else plots.WIDTH
+        figure = plots.new_figure(width, 2.6 if agent is None else 3.8)
+        n_panels = 1 if agent is None else 2
+        panels = figure.subplots(n_panels, 1, sharex=True, squeeze=False)[:, 0]
+        self._draw_returns(panels[0])
+        if agent is not None:
+            self._draw_schedule(panels[1], agent)
+        panels[-1].set_xlabel("step", fontsize=9, color=plots.INK)
+        return plain(figure)
+
+    def _draw_returns(self, axes: plots.Axes) -> None:
+        """Draw the returns of episodes as dots, and the means of evaluations as a line."""
         episodes = [row for row in self.rows if row["kind"] == "episode"]
         evaluations = [row for row in self.rows if row["kind"] == "evaluation"]
-        has_schedule = isinstance(self.agent, ValueAgent) and bool(self.rows)
-        width = plots.NARROW_WIDTH if narrow else plots.WIDTH
-        figure = plots.new_figure(width, 3.8 if has_schedule else 2.6)
-        panels = figure.subplots(1 + has_schedule, 1, sharex=True, squeeze=False)[:, 0]
-        panels[0].plot(
+        axes.plot(
             [row["step"] for row in episodes], [row["return"] for row in episodes], ".",
             color=plots.FAINT, alpha=0.5, markersize=3, rasterized=True, label="episode",
         )  # fmt: skip
         if evaluations:
-            x, y = ([row[name] for row in evaluations] for name in ("step", "mean_return"))
-            panels[0].plot(
-                x, y, "o-", color=plots.color_of(0), markersize=3.5, label="evaluation, mean"
-            )
-        panels[0].set_ylabel("return", fontsize=9, color=plots.INK)
-        panels[0].legend(fontsize=8, frameon=False)
-        plots.style(panels[0])
-        if has_schedule and isinstance(self.agent, ValueAgent):
-            steps = np.linspace(0, max(row["step"] for row in self.rows), N_POINTS).round()
-            schedule = schedule_of(self.agent, steps, self._progress_at(steps, episodes))
-            for values, name, color in (
-                (schedule.epsilon, "epsilon", plots.color_of(1)),
-                (schedule.learning_rate, "alpha", plots.color_of(2)),
-            ):
-                panels[1].plot(steps, values, color=color, linewidth=1.4, label=name)
-            panels[1].set_ylim(bottom=0)
-            panels[1].legend(fontsize=8, frameon=False)
-            plots.style(panels[1])
-        panels[-1].set_xlabel("step", fontsize=9, color=plots.INK)
-        return plain(figure)
+            axes.plot(
+                [row["step"] for row in evaluations], [row["mean_return"] for row in evaluations],
+                "o-", color=plots.color_of(0), markersize=3.5, label="evaluation, mean",
+            )  # fmt: skip
+        axes.set_ylabel("return", fontsize=9, color=plots.INK)
+        axes.legend(fontsize=8, frameon=False)
+        plots.style(axes)
 
-    def _progress_at(self, steps: Floats, episodes: Sequence[Row]) -> Floats:
+    def _draw_schedule(self, axes: plots.Axes, agent: ValueAgent[Any, Any]) -> None:
+        """Draw epsilon and alpha, which are scheduled over the training."""
+        steps = np.linspace(0, max(row["step"] for row in self.rows), N_POINTS).round()
+        schedule = schedule_of(agent, steps, self._progress_at(steps))
+        for values, name, color in (
+            (schedule.epsilon, "epsilon", plots.color_of(1)),
+            (schedule.learning_rate, "alpha", plots.color_of(2)),
+        ):
+            axes.plot(steps, values, color=color, linewidth=1.4, label=name)
+        axes.set_ylim(bottom=0)
+        axes.legend(fontsize=8, frameon=False)
+        plots.style(axes)
+
+    def _progress_at(self, steps: Floats) -> Floats:
         """Return the share of the goal that was reached at `steps`, in [0, 1]."""
         goal = self.run.goal
         if goal.steps is not None:
             return steps / goal.steps
-        n_done = np.searchsorted([row["step"] for row in episodes], steps, side="right")
-        return n_done / max(goal.episodes or 1, 1)
+        ends = [row["step"] for row in self.rows if row["kind"] == "episode"]
+        return np.searchsorted(ends, steps, side="right") / (goal.episodes or 1)
 
     def to_json(self) -> dict[str, object]:
         """Return influences, warnings and the episode as values that JSON can hold."""

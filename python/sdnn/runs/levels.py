@@ -82,6 +82,7 @@ class _RandomAgent:
         self._actions = actions
 
     def act(self, observation: Element, explore: bool = False) -> Element:
+        """Return a random action, whatever is observed."""
         return self._actions.sample()
 
 

@@ -108,13 +108,13 @@ def _write_frames(path: Path, frames: Iterator[NDArray[np.uint8]], rate: float) 
     options: dict[str, object] = {"quality": 7, "output_params": ["-f", "mp4"]}
     if is_gif:
         rate = min(rate, _FASTEST_GIF)
-        end = str(round(100 / rate) + 100)  # stays for a second before it begins anew
-        parameters = ["-f", "gif", "-vf", _PALETTES, "-final_delay", end]
+        delay = str(round(100 / rate) + 100)  # in 1/100 s: the last picture stays a second longer
+        parameters = ["-f", "gif", "-vf", _PALETTES, "-final_delay", delay]
         options = {"codec": "gif", "pix_fmt_out": "pal8", "output_params": parameters}
     with whole_file(path) as file, ExitStack() as stack:
         writer = None
         for frame in frames:
-            if not is_gif:  # whose pictures have even sides
+            if not is_gif:  # the pictures of MP4 have even sides: repeat the last row or column
                 edges = [(0, n % 2) for n in frame.shape[:2]] + [(0, 0)]
                 frame = np.pad(frame, edges, mode="edge")
             if writer is None:

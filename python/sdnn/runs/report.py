@@ -123,14 +123,10 @@ def format_estimate(
     if estimate is None or math.isnan(estimate.value):
         return "-"
     scale, unit = (100, " %") if measure == "final_share_solved" else (1, "")
-    decimals = 1
-    numbers = np.array([estimate.value, estimate.lower, estimate.upper])
-    numbers = numbers[np.isfinite(numbers)]
-    if measure in RETURN_MEASURES and numbers.any():  # two digits of the interval's extent
-        extent = float(np.ptp(numbers)) or float(np.abs(numbers).max()) / 100
-        decimals = min(max(1, 1 - math.floor(math.log10(extent))), 300)
+    decimals = _decimals_of_return(estimate) if measure in RETURN_MEASURES else 1
 
     def number(value: float) -> str:
+        """Write a number of the estimate."""
         if math.isinf(value):
             return f">{last_episode:,}"
         return plain_number(scale * value, decimals, sign)
@@ -138,3 +134,17 @@ def format_estimate(
     if math.isnan(estimate.lower):
         return number(estimate.value) + unit
     return f"{number(estimate.value)}{unit} [{number(estimate.lower)}, {number(estimate.upper)}]"
+
+
+def _decimals_of_return(estimate: Estimate) -> int:
+    """Return how many decimals show two digits of the extent of an interval, at least one.
+
+    An interval from 0.12 to 0.15 has the extent 0.03 and needs three. A value without an interval
+    has the decimals of an extent of 1 % of it.
+    """
+    numbers = np.array([estimate.value, estimate.lower, estimate.upper])
+    numbers = numbers[np.isfinite(numbers)]
+    if not numbers.any():
+        return 1
+    extent = float(np.ptp(numbers)) or float(np.abs(numbers).max()) / 100
+    return min(max(1, 1 - math.floor(math.log10(extent))), 300)  # 300: for the smallest floats

@@ -94,25 +94,25 @@ def forecast(study: Study, out: Path, jobs: int) -> dict[str, object]:
         with ResultStore(out, read_only=True) as store:
             stored = store.seconds()
     study.check(stored)
-    works: list[dict[str, object]] = []
-    missing: dict[TrialKey, tuple[float, bool]] = {}  # equal variants share trials
-    probes: dict[tuple[str, str, bool], tuple[float, int]] = {}
+    pairs: list[dict[str, object]] = []  # a row of the table for each variant in each case
+    # Seconds of each missing trial, and whether it is compiled; equal variants share trials.
+    missing: dict[TrialKey, tuple[float, bool]] = {}
+    probes: dict[tuple[str, str, bool], tuple[float, int]] = {}  # results of `_probe`
     for pair in study.pairs:
         keys, spec = study.keys(*pair), study.combinations[pair].spec
         to_run = [key for key in keys if key not in stored]
         times = [stored[key] for key in keys if key in stored]
         source = f"{len(times)} stored trial{'s' if len(times) > 1 else ''}"
         if not times:
-            # Seeds and variants of equal settings share a probe, whose rate is seconds per step,
-            # or per episode where the budget counts these.
-            probe_key = (*keys[0][:2], spec.budget.steps is None)
+            # Variants of an agent in a case share a probe, if their budgets count the same.
+            probe_key = (pair[0], spec.label, spec.budget.steps is None)
             if probe_key not in probes:
                 probes[probe_key] = _probe(PlannedTrial(keys[0], spec))
             rate, n_episodes = probes[probe_key]
             times, source = [rate * spec.length], f"the first {n_episodes} episodes of one"
         seconds = sum(times) / len(times)
         missing |= dict.fromkeys(to_run, (seconds, spec.is_compiled))
-        works.append(
+        pairs.append(
             {
                 "case": pair[0],
                 "variant": pair[1],
@@ -128,7 +128,7 @@ def forecast(study: Study, out: Path, jobs: int) -> dict[str, object]:
         )
     n_planned = len(study.plan())
     return {
-        "trials": works,
+        "trials": pairs,
         "planned": n_planned,
         "stored": n_planned - len(missing),
         "jobs": jobs,
@@ -138,7 +138,10 @@ def forecast(study: Study, out: Path, jobs: int) -> dict[str, object]:
 
 
 def _probe(planned: PlannedTrial) -> tuple[float, int]:
-    """Run the start of a trial; return processor time per step or episode, and episodes run."""
+    """Run the start of a trial; return its processor time per unit of its budget, and its episodes.
+
+    Time is in seconds; the unit is a step or, where the budget counts these, an episode.
+    """
     spec = planned.spec
     try:
         with opened(spec.make_trial(planned.key.seed)) as trial:
@@ -157,12 +160,16 @@ def _probe(planned: PlannedTrial) -> tuple[float, int]:
 def wall_seconds(trials: list[tuple[float, bool]], jobs: int) -> float:
     """Estimate the wall time of trials from their processor times and whether they are compiled.
 
-    Trials in Python share one core whatever the number of jobs, because they hold Python's lock.
-    More jobs than cores do not help.
+    It is the largest of three bounds: all cores are busy, the longest trial runs on a single core,
+    and trials in Python share a core whatever the number of jobs, because they hold Python's lock.
+
+    >>> wall_seconds([(6.0, True), (2.0, False), (1.0, False)], jobs=1)
+    9.0
     """
     times = [seconds for seconds, _ in trials]
-    locked = sum(seconds for seconds, is_compiled in trials if not is_compiled)
-    return max(sum(times) / max(1, min(jobs, n_cores())), max(times, default=0.0), locked)
+    of_python = sum(seconds for seconds, is_compiled in trials if not is_compiled)
+    n_parallel = max(1, min(jobs, n_cores()))
+    return max(sum(times) / n_parallel, max(times, default=0.0), of_python)
 
 
 Addition: TypeAlias = tuple[Sequence[Section], Mapping[str, object]]
@@ -202,10 +209,8 @@ def study_page(
     """Return the page of a study, with the digest of its rows and its figures, SVG and PNG."""
     study = comparison.study
     n_all, n_measured = len(study.combinations), len(comparison.measured)
-    counts = {"variant": study.variants, "case": study.cases, "trial": range(study.n_trials)}
-    variants, cases, trials = (
-        f"{len(items)} {word}{'' if len(items) == 1 else 's'}" for word, items in counts.items()
-    )
+    counts = {"variant": len(study.variants), "case": len(study.cases), "trial": study.n_trials}
+    variants, cases, trials = (f"{n} {noun}{'' if n == 1 else 's'}" for noun, n in counts.items())
     missing = (
         f"Not complete: {n_all - n_measured} of {n_all} combinations of case and variant lack"
         " trials and are left out."
@@ -241,21 +246,22 @@ def _case_sections(comparison: Comparison) -> Iterator[Section]:
     for case in comparison.cases:
         measured = comparison.of_case(case.id)
         names = [n for n in MEASURES if any(n in m.result.values for m in measured)]
-        measures = tuple(name.replace("_", " ") for name in names)
-        end = ("end solved",) if any(m.solved_at_end is not None for m in measured) else ()
+        titles = tuple(name.replace("_", " ") for name in names)
+        judges_end = any(m.solved_at_end is not None for m in measured)
+        end = ("end solved",) if judges_end else ()
         rows = [
             (m.variant.title, title_of(m.result.agent), str(m.result.n_trials),
-             *((m.end_solved,) if end else ()), *report.measure_cells(m.result, names))
+             *((m.end_solved,) if judges_end else ()), *report.measure_cells(m.result, names))
             for m in measured
         ]  # fmt: skip
-        header = ("variant", "agent", "trials", *end, *measures, *report.MEASURE_END)
-        brief = ("variant", *end, *(word for word in measures if word not in ONLY_IN_FULL))
+        header = ("variant", "agent", "trials", *end, *titles, *report.MEASURE_END)
+        brief = ("variant", *end, *(title for title in titles if title not in ONLY_IN_FULL))
         yield Section(table=Table(case.title, header, rows, brief=brief))
         title = f"{case.title}: minus {comparison.study.reference}, trial by trial"
         compared = [m for m in measured if m.differences]
         rows = [(m.variant.title, *(_difference(m, n) for n in names)) for m in compared]
         if rows:
-            yield Section(level=0, table=Table(title, ("variant", *measures), rows, brief=brief))
+            yield Section(level=0, table=Table(title, ("variant", *titles), rows, brief=brief))
 
 
 def _difference(measured: Measured, name: MeasureName) -> str:
@@ -310,7 +316,7 @@ def study_json(comparison: Comparison, digest: str, addition: Addition) -> dict[
 def trial_table(comparison: Comparison) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
     """Return header and rows with the measures of each trial; measures it lacks are empty."""
     pairs = comparison.measured.items()
-    names = list(dict.fromkeys(name for _, pair in pairs for name in pair.result.values))
+    names = list(dict.fromkeys(name for _, m in pairs for name in m.result.values))
     header = (
         "case", "variant", "agent", "trial", "seed", "config_hash", "version", *names, "decisions",
         "seconds",

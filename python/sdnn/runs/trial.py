@@ -65,7 +65,7 @@ def trial_seed(root_seed: int, case_id: str, trial: int) -> int:
 
 
 Column: TypeAlias = NDArray[np.int32 | np.float64 | np.bool_]
-"""A column with a number for each evaluation: its only episode's, or the mean over episodes."""
+"""A column, (n_tests,): of each evaluation its only episode's number, or the mean over episodes."""
 
 HASH_DIGITS = 16  # hexadecimal digits kept of a text's SHA-256: 64 bits
 
@@ -107,7 +107,7 @@ solved. ``environment`` is `UNKNOWN` where there is one only.
 UNKNOWN = -1
 
 _COLUMNS = {"episode": "<i4", "length": "<i4", "return": "<f8", "terminated": "u1"}
-"""Columns of test episodes with the types in which they are hashed."""
+"""Columns of test episodes with the types in which, and the order in which, they are hashed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,14 +126,14 @@ class TrialRows:
         cls, episode: ArrayLike, steps: ArrayLike, episode_return: ArrayLike, solved: ArrayLike
     ) -> TrialRows:
         """Make rows from the columns of a compiled trial's test episodes, each (n_tests,)."""
-        columns = episode, steps, episode_return, solved
-        shapes = set(map(np.shape, columns))
+        columns = dict(zip(_COLUMNS, (episode, steps, episode_return, solved), strict=True))
+        shapes = set(map(np.shape, columns.values()))
         if shapes != {(np.size(episode),)}:
             raise ValueError(f"test rows must be columns of one length, got shapes {shapes}")
         table = np.zeros(np.size(episode), ROW)
         table["number"], table["kind"] = np.arange(table.size), "evaluation"
         table["step"] = table["environment"] = UNKNOWN
-        for name, column in zip(_COLUMNS, columns, strict=True):
+        for name, column in columns.items():
             table[name] = column
         return cls(table)
 
@@ -155,8 +155,8 @@ class TrialRows:
         """Return the rows in the form of a `sdnn.agents.Training`; inverts `from_training`."""
         rows: list[Row] = []
         starts = np.flatnonzero(self.table["part"] == 0)
-        for episode in np.split(self.table, starts[1:]) if len(starts) else []:
-            first = episode[0]
+        for episodes in np.split(self.table, starts[1:]) if len(starts) else []:
+            first = episodes[0]  # the only one, unless it is a larger evaluation
             row: dict[str, object] = {
                 "kind": str(first["kind"]), "step": int(first["step"]),
                 "episode": int(first["episode"]),
@@ -168,9 +168,9 @@ class TrialRows:
                 row["length"] = int(first["length"])
                 row["terminated"] = bool(first["terminated"])
             else:
-                returns, lengths = episode["return"].copy(), episode["length"].copy()
-                ends = episode["terminated"].copy()
-                row |= Evaluation(returns=returns, lengths=lengths, terminated=ends).row()
+                returns, lengths = episodes["return"].copy(), episodes["length"].copy()
+                terminated = episodes["terminated"].copy()
+                row |= Evaluation(returns=returns, lengths=lengths, terminated=terminated).row()
             rows.append(row)
         return rows
 

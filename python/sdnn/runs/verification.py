@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 import sdnn.runs.engine as engine
 from sdnn._core import __version__
@@ -101,8 +102,8 @@ class Verification:
 
     def __str__(self) -> str:
         """Return the outcome as the line that ``sdnn verify`` prints."""
-        name = self.instruction_set
-        name = name if name == "portable" else name.upper()
+        is_portable = self.instruction_set == "portable"  # the others are names such as AVX2
+        name = self.instruction_set if is_portable else self.instruction_set.upper()
         n_different = sum(difference.was_run for difference in self.differences)
         n_failed = len(self.differences) - n_different
         noun = "trial" if self.n_reported == 1 else "trials"
@@ -195,10 +196,12 @@ def verify(
     # A difference may come from an environment that does not repeat itself: run those twice.
     unexplained = [p for p in plan if p.key in differences and not p.spec.is_compiled]
     if unexplained and signal is None:
-        repeated, signal = _run(unexplained, executor, observe)
-        for key in repeated:
-            records = [r for r in (results[key], repeated[key]) if isinstance(r, TrialRecord)]
-            if len({record.rows.checksum() for record in records}) == 2:
+        again, signal = _run(unexplained, executor, observe)
+        for key, second in again.items():
+            first = results[key]
+            if isinstance(first, Exception) or isinstance(second, Exception):
+                continue
+            if first.rows.checksum() != second.rows.checksum():
                 problem = "its environment or agent does not repeat itself: two runs here differ"
                 differences[key] = Difference(key, problem, _about(reported[key], reports))
     return Verification(
@@ -216,7 +219,7 @@ def verify(
 def _plan(
     reported: Iterable[ReportedTrial], reports: Reports, consent: Consent
 ) -> tuple[list[engine.PlannedTrial], dict[TrialKey, Difference]]:
-    """Return the trials to run, and those whose configuration cannot be used."""
+    """Return the trials to run, and by key the others, whose configuration cannot be used."""
     plan, differences = [], {}
     for trial in reported:
         key = trial.key
@@ -226,8 +229,8 @@ def _plan(
             problem = f"its configuration cannot be used here: {error}"
             differences[key] = Difference(key, problem, _about(trial, reports), was_run=False)
             continue
-        resumed = ResumedTrial(key, spec, trial.goals)
-        plan.append(resumed if trial.goals else engine.PlannedTrial(key, spec))
+        planned = engine.PlannedTrial(key, spec)
+        plan.append(ResumedTrial(key, spec, trial.goals) if trial.goals else planned)
     return plan, differences
 
 
@@ -238,6 +241,7 @@ def _run(
     results: dict[TrialKey, TrialRecord | Exception] = {}
 
     def keep(ended: Sequence[engine.Finished | engine.Failed]) -> None:
+        """Note the record or the error of each trial."""
         for message in ended:
             result = message.error if isinstance(message, engine.Failed) else message.record
             results[message.planned.key] = result
@@ -264,20 +268,26 @@ def compare(trial: ReportedTrial, record: TrialRecord, reports: Reports) -> Diff
 
 
 def _first_difference(reported: TrialRows, here: TrialRows) -> tuple[str, tuple[str, ...]]:
-    """Return what differs first, and the lines of both rows."""
-    tables = reported.table, here.table
-    n_rows = min(map(len, tables))
-    bits = [np.ascontiguousarray(table[:n_rows]).astype(ROW.newbyteorder("<")) for table in tables]
-    as_bytes = [table.view(np.uint8).reshape(n_rows, ROW.itemsize) for table in bits]
-    unequal = np.flatnonzero((as_bytes[0] != as_bytes[1]).any(axis=1))
-    if unequal.size == 0:
-        return f"it has {len(tables[1])} rows, reported are {len(tables[0])}", ()
-    first = int(unequal[0])
+    """Return in words which row differs first, and a line with each of the two rows.
+
+    Rows are compared as bytes: equal numbers may have other bits, such as 0.0 and -0.0.
+    """
+    n_common = min(len(reported.table), len(here.table))
+
+    def bytes_of(table: NDArray[np.void]) -> NDArray[np.uint8]:
+        """Return the first rows as bytes, (n_common, bytes of a row)."""
+        rows = np.ascontiguousarray(table[:n_common]).astype(ROW.newbyteorder("<"))
+        return rows.view(np.uint8).reshape(n_common, ROW.itemsize)
+
+    differs = (bytes_of(reported.table) != bytes_of(here.table)).any(axis=1)
+    if not differs.any():
+        return f"it has {len(here.table)} rows, reported are {len(reported.table)}", ()
+    first = int(np.argmax(differs))
     lines = (
-        f"reported: {row_words(tables[0][first])}",
-        f"here:     {row_words(tables[1][first])}",
+        f"reported: {row_words(reported.table[first])}",
+        f"here:     {row_words(here.table[first])}",
     )
-    return f"row {first + 1} of {len(tables[0])} differs", lines
+    return f"row {first + 1} of {len(reported.table)} differs", lines
 
 
 def row_words(row: np.void) -> str:
