@@ -33,7 +33,7 @@ from sdnn.runs import (
     WorkerLostError,
     run_trials,
 )
-from sdnn.runs.engine import Failed
+from sdnn.runs.engine import Advanced, Failed
 from sdnn.runs.trial import records_digest
 
 
@@ -102,19 +102,21 @@ def test_trials_of_gymnasium_environments_have_the_rows_of_a_local_run(pair, tmp
 def test_long_trials_report_progress_and_free_their_workers_when_interrupted(pair, tmp_path):
     plan = make_plan(1, 10_000_000)
 
-    def messages_until_progress():
-        """Run the trials, and interrupt them at the first report of a finished episode."""
-        stop, messages = threading.Event(), []
-        for message in DaskExecutor(str(pair.file)).run(plan, stop):
-            messages.append(message)
-            if getattr(message, "episode", 0) > 0:
-                stop.set()
-        return messages
+    def run_until_the_first_progress():
+        """Run the plan until a trial has done episodes; return the last number of episodes."""
+        stop, n_episodes = threading.Event(), 0
+        for batch in DaskExecutor(str(pair.file)).run(plan, stop):
+            for message in batch:
+                assert not isinstance(message, Failed)
+                if isinstance(message, Advanced) and message.episode > 0:
+                    n_episodes = message.episode
+                    stop.set()
+        return n_episodes
 
-    assert 0 < messages_until_progress()[-1].episode < 10_000_000
-    # These trials can run again at once, although a worker may still be giving them up.
-    assert not any(isinstance(message, Failed) for message in messages_until_progress())
-    # The workers are free for other trials: the interrupted ones would take minutes.
+    assert 0 < run_until_the_first_progress() < 10_000_000
+    # An interruption frees the workers: the trials would take minutes. The same ones may be wanted
+    # again while a worker still gives them up.
+    assert 0 < run_until_the_first_progress() < 10_000_000
     begin = time.monotonic()
     assert run(tmp_path, make_plan(1, 10), pair)[0].n_run == 2
     assert time.monotonic() - begin < 20
