@@ -158,6 +158,18 @@ def invoke(monkeypatch, tmp_path, use_trial):
 
 
 @pytest.fixture
+def output_of(invoke):
+    """Call a command that must succeed; return what it prints."""
+
+    def _output_of(*arguments):
+        result = invoke(*arguments)
+        assert result.exit_code == 0, result.output
+        return result.stdout
+
+    return _output_of
+
+
+@pytest.fixture
 def refused(invoke):
     """Calls a command that must fail with an exit code and print no result; returns its error."""
 

@@ -19,6 +19,7 @@ from sdnn.runs.config_file import read_spec
 
 
 def steps_of_checkpoint(run):
+    """Return the steps that the checkpoint of a run has, 0 if there is none."""
     try:
         env, evaluation_env = (run.spec.environment.make() for _ in range(2))
         path = run.folder / "checkpoint.safetensors"
@@ -28,12 +29,13 @@ def steps_of_checkpoint(run):
 
 
 def main(folder, config, n_kills, seed):
+    """Kill processes that train the run, at least until they have left three checkpoints."""
     run = Run.create(folder, read_spec(config))
     generator = random.Random(seed)
     began = time.perf_counter()
     most_seconds = 0.02  # of a process; grows while processes are killed before a checkpoint
     n_killed, saved_steps = 0, [0]
-    while n_killed < n_kills or len(set(saved_steps)) < 4:
+    while n_killed < n_kills or len(set(saved_steps)) < 1 + 3:  # 0 is no checkpoint
         child = os.fork()
         if child == 0:
             code = 1
@@ -41,7 +43,7 @@ def main(folder, config, n_kills, seed):
                 run.train()
                 code = 0
             finally:
-                os._exit(code)
+                os._exit(code)  # without what the parent does at its exit
         time.sleep(generator.uniform(0.0, most_seconds))
         os.kill(child, signal.SIGKILL)
         _, status = os.waitpid(child, 0)

@@ -33,6 +33,7 @@ def test_the_number_of_jobs_does_not_change_the_stored_rows(tmp_path, run):
 
 
 def plan_of_small_agents(n_trials, n_episodes):
+    """Plan trials of three agents in each of the four cases of the second experiment."""
     cases = EXPERIMENTS[1].with_agents(["fuzzy", "sdnn-c", "rbf"]).cases
     return plan_trials(cases, n_trials, root_seed=0, n_episodes=n_episodes)
 
@@ -330,6 +331,7 @@ def test_a_trial_that_cannot_be_stored_loses_none_that_ended_before_it(tmp_path,
 
 
 def records_of(folder):
+    """Return the stored trials of a folder."""
     with ResultStore(folder, read_only=True) as store:
         return store.load()
 

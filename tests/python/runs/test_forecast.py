@@ -19,7 +19,7 @@ learning.discount = [0.8, 0.9]
 
 
 def test_forecasts_use_stored_trials_or_else_one_probe(use_trial, study, tmp_path, monkeypatch):
-    probed_seeds = []
+    probed_seeds, clock = [], [0.0]  # seconds of the patched clock
 
     class Probed(fake_trial.FakeTrial):
         def __init__(self, **options):
@@ -30,7 +30,6 @@ def test_forecasts_use_stored_trials_or_else_one_probe(use_trial, study, tmp_pat
             clock[0] += 0.1
             super().advance(n)
 
-    clock = [0.0]
     monkeypatch.setattr(sweep.time, "thread_time", lambda: clock[0])
     use_trial(Probed)
     mine = study(STUDY)

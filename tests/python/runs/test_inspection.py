@@ -73,25 +73,23 @@ TASKS = {  # the name and the type of one of the inputs
 
 
 @pytest.fixture
-def trained(invoke):
+def trained(output_of):
     """Train a short run and return its folder."""
 
     def _trained(task, *options, steps=2500):
         arguments = ("train", task, "--steps", steps, "--evaluate-every", 1000, "--out", "run")
-        result = invoke(*arguments, "--evaluation-episodes", 2, *options)
-        assert result.exit_code == 0, result.output
+        output_of(*arguments, "--evaluation-episodes", 2, *options)
         return Path("run")
 
     return _trained
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_the_page_is_small_and_self_contained(invoke, trained, task):
+def test_the_page_is_small_and_self_contained(output_of, trained, task):
     folder = trained(task)
     before = (folder / "checkpoint.safetensors").read_bytes()
-    result = invoke("inspect", folder, "--json")
-    assert result.exit_code == 0, result.output
-    input_types = {i["name"]: i["type"] for i in json.loads(result.stdout)["inputs"]}
+    printed = output_of("inspect", folder, "--json")
+    input_types = {i["name"]: i["type"] for i in json.loads(printed)["inputs"]}
     name, input_type = TASKS[task]
     assert input_types[name] == input_type
     page = (folder / "inspect.html").read_text()
@@ -104,12 +102,11 @@ def test_the_page_is_small_and_self_contained(invoke, trained, task):
     assert (folder / "checkpoint.safetensors").read_bytes() == before
 
 
-def test_the_table_and_the_warnings_are_printed(invoke, trained):
+def test_the_table_and_the_warnings_are_printed(output_of, trained):
     folder = trained("MountainCar-v0", "--agent", "sdnn-c", steps=300)
-    result = invoke("inspect", folder, "--input", "0", "--out", "page.html")
-    assert result.exit_code == 0, result.output
-    assert "observation 1" in result.stdout
-    assert result.stdout.splitlines()[-1] == "wrote page.html"
+    printed = output_of("inspect", folder, "--input", "0", "--out", "page.html")
+    assert "observation 1" in printed
+    assert printed.splitlines()[-1] == "wrote page.html"
     page = Path("page.html").read_text()
     for words in ("mean size of corrections", "step of values", "share changed"):
         assert words in page
@@ -118,14 +115,14 @@ def test_the_table_and_the_warnings_are_printed(invoke, trained):
         assert warning.split(":")[0] in page
 
 
-def test_the_map_is_over_the_named_inputs_and_the_episode_follows_from_the_seed(invoke, trained):
+def test_the_map_is_over_the_named_inputs_and_the_episode_follows_from_the_seed(output_of, trained):
     folder, seed = trained("CartPole-v1"), 4
     options = ("--input", "observation 3", "--input", 0, "--json", "--seed", seed)
-    values = json.loads(invoke("inspect", folder, *options).stdout)
+    values = json.loads(output_of("inspect", folder, *options))
     assert values["map_of"] == ["observation 3", "observation 0"]
     returns = Run.open(folder).evaluate(1, seed).returns
     assert values["episode"]["return"] == returns[0]
-    assert values == json.loads(invoke("inspect", folder, *options).stdout)
+    assert values == json.loads(output_of("inspect", folder, *options))
 
 
 def test_wrong_options_are_named(invoke, refused, trained):

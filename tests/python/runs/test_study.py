@@ -76,7 +76,8 @@ def test_settings_of_variants_override_cases_agents_and_base(study):
         agent = "rbf"
         """
     )
-    # Each overrides those before: base, agents, cases, variants, cases of a variant.
+    # Each overrides those before: base, agents, cases, variants, cases of a variant. By default
+    # the learning rate of rbf is 0.5, and n_greedy_steps is 10.
     values = {
         pair: (c.learning.discount, c.learning.learning_rate, c.learning.n_greedy_steps)
         for pair, c in configs(loaded).items()

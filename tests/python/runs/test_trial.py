@@ -25,6 +25,7 @@ SEED = 11
 
 
 def spec_of(agent, n_sensors=4, noise=0.0):
+    """Return a specification of 60 episodes on the paper's acrobot, evaluated every 5."""
     spec = case_spec(Case("case", "", n_sensors, noise, (agent,), ""), agent, 60)
     return spec.replace(seed=SEED, protocol=spec.protocol.replace(evaluate_every_episodes=5))
 
@@ -46,19 +47,7 @@ def python_trial(spec, monkeypatch):
     return trial
 
 
-@pytest.mark.parametrize(
-    "agent",
-    [
-        "sdnn-c",
-        "sdnn-c-robust",
-        "sdnn-c-general",
-        "sdnn-c-small",
-        "fuzzy",
-        "rbf",
-        "q-lambda",
-        "q-lambda-general",
-    ],
-)
+@pytest.mark.parametrize("agent", [name for name in labels() if agent_entry(name).core_trial])
 @pytest.mark.parametrize(("n_sensors", "noise"), [(4, 0.0), (4, 0.02), (5, 0.02), (6, 0.02)])
 def test_a_trial_in_python_has_the_bits_of_the_compiled_trial(agent, n_sensors, noise, monkeypatch):
     spec = spec_of(agent, n_sensors, noise)
@@ -120,6 +109,7 @@ class NoSettings:
 
 
 def entry_of(agent_id):
+    """Return the entry of an agent without settings, which cannot be made."""
     settings = {"approximator": NoSettings, "learning": NoSettings}
     return AgentEntry(id=agent_id, title="", agent=object, **settings)
 

@@ -49,6 +49,7 @@ def fake_store(run, tmp_path):
 
 
 def stored(folder, records):
+    """Store records in a folder, and return it."""
     with ResultStore(folder) as store:
         for record in records:
             store.add(record)
@@ -71,6 +72,7 @@ def with_config(record, change):
 
 
 def verify_folder(folder, consent=None, **options):
+    """Verify the stored trials of a folder, by default without code of other modules."""
     consent = consent or Consent()
     return verify(StoredReports(folder, consent), consent=consent, **options)
 
@@ -223,8 +225,8 @@ def own_module(tmp_path, monkeypatch):
     sys.modules.pop("my_envs", None)
 
 
-def test_modules_are_imported_with_consent_only(invoke, own_module):
-    assert invoke("train", "my_envs:mine/Env-v0", "--steps", 100, *SMALL, "--out", "run").stdout
+def test_modules_are_imported_with_consent_only(invoke, output_of, own_module):
+    output_of("train", "my_envs:mine/Env-v0", "--steps", 100, *SMALL, "--out", "run")
     own_module.unlink()
     del sys.modules["my_envs"]
     assert invoke("verify", "run", "--case", "nowhere").exit_code == 2
@@ -234,8 +236,7 @@ def test_modules_are_imported_with_consent_only(invoke, own_module):
     assert not own_module.exists()
     del gym.registry["mine/Env-v0"]
     # Once the environment is registered, its id without a module needs consent, too.
-    result = invoke("verify", "run", "--import", "my_envs")
-    assert result.exit_code == 0, result.output
+    output_of("verify", "run", "--import", "my_envs")
     assert own_module.exists()
     refuses("my_envs", Consent().require, "my_envs:mine/Env-v0", error=RunError)
     refuses("drifting_env", Consent().require, "mine/Env-v0", error=RunError)
@@ -260,33 +261,30 @@ def test_a_store_with_environments_of_modules_runs_the_others(tmp_path, invoke, 
     assert (result.exit_code, result.stdout) == (1, "")
 
 
-def test_runs_are_repeated_with_the_goals_that_were_set_later(invoke):
+def test_runs_are_repeated_with_the_goals_that_were_set_later(invoke, output_of):
     options = ("--steps", 150, *SMALL, "--seed", 3)
     train = ("train", "drifting_env:tests/Drifting-v0", *options)
     verified = ("verify", "--import", "drifting_env")
     for name, more in (("one", ()), ("several", ("--n-envs", 3))):
-        assert invoke(*train, *more, "--out", name).exit_code == 0
-        assert invoke(*verified, name).exit_code == 0
-        assert invoke("resume", name, "--steps", 250).exit_code == 0
-        assert invoke("resume", name, "--episodes", 12).exit_code == 0
-        result = invoke(*verified, name, "--certificate", f"{name}.json")
-        assert result.exit_code == 0, result.output
-        result = invoke(*verified, f"{name}.json")
-        assert result.exit_code == 0, result.output
-        assert "all digests equal" in result.stdout
+        output_of(*train, *more, "--out", name)
+        output_of(*verified, name)
+        output_of("resume", name, "--steps", 250)
+        output_of("resume", name, "--episodes", 12)
+        output_of(*verified, name, "--certificate", f"{name}.json")
+        assert "all digests equal" in output_of(*verified, f"{name}.json")
     certificate = json.loads(Path("one.json").read_text())
     certificate["trials"][0]["goals"][-1]["episodes"] = 10**6
     Path("long.json").write_text(json.dumps(certificate))
     result = invoke(*verified, "long.json")
     assert (result.exit_code, "goals" in result.stdout) == (1, True)
-    values = json.loads(invoke(*verified, "one", "--json").stdout)
+    values = json.loads(output_of(*verified, "one", "--json"))
     assert (values["n_reported"], len(values["equal"]), values["differences"]) == (1, 1, [])
     with ResultStore("one", read_only=True) as store:
         assert values["digest"] == records_digest(store.load())
 
 
-def test_an_edited_configuration_of_a_run_is_named(invoke, tmp_path):
-    assert invoke("train", "CartPole-v1", "--steps", 150, *SMALL, "--out", "run").exit_code == 0
+def test_an_edited_configuration_of_a_run_is_named(invoke, output_of, tmp_path):
+    output_of("train", "CartPole-v1", "--steps", 150, *SMALL, "--out", "run")
     path = tmp_path / "run" / "config.json"
     values = json.loads(path.read_text())
     path.write_text(json.dumps(values | {"learning": {"discount": 0.5}}))
@@ -295,18 +293,18 @@ def test_an_edited_configuration_of_a_run_is_named(invoke, tmp_path):
     assert "learning.discount is 0.5" in result.stdout
 
 
-def test_environments_that_do_not_repeat_themselves_are_named(invoke):
+def test_environments_that_do_not_repeat_themselves_are_named(invoke, output_of):
     task = "drifting_env:tests/Restless-v0"
-    assert invoke("train", task, "--steps", 150, *SMALL, "--out", "run").exit_code == 0
+    output_of("train", task, "--steps", 150, *SMALL, "--out", "run")
     result = invoke("verify", "run", "--import", "drifting_env")
     assert result.exit_code == 1
     assert "does not repeat itself" in result.stdout
 
 
-def test_a_trial_that_fails_here_is_named(invoke):
+def test_a_trial_that_fails_here_is_named(output_of):
     task = "drifting_env:tests/Broken-v0"
     train = ("train", task, "--steps", 150, *SMALL, "--env-arg", "bad_step=10000", "--out", "run")
-    assert invoke(*train).exit_code == 0
+    output_of(*train)
     with ResultStore("run") as store:
         (record,) = store.load()
     broken = with_config(record, lambda v: v["environment"]["kwargs"].update(bad_step=50))
@@ -456,11 +454,11 @@ def test_a_certificate_without_a_folder_is_refused_before_trials_are_run(
     assert "recomputed" not in result.output
 
 
-def test_verifying_leaves_a_run_as_it_is(invoke, tmp_path):
-    assert invoke("train", "CartPole-v1", "--steps", 150, *SMALL, "--out", "run").exit_code == 0
+def test_verifying_leaves_a_run_as_it_is(output_of, tmp_path):
+    output_of("train", "CartPole-v1", "--steps", 150, *SMALL, "--out", "run")
     folder = tmp_path / "run"
     shutil.copytree(folder, tmp_path / "before")
-    assert invoke("verify", "run").exit_code == 0
+    output_of("verify", "run")
     names = sorted(path.name for path in folder.iterdir())
     assert names == sorted(path.name for path in (tmp_path / "before").iterdir())
     for name in names:
