@@ -47,7 +47,11 @@ def python_trial(spec, monkeypatch):
     return trial
 
 
-@pytest.mark.parametrize("agent", [name for name in labels() if agent_entry(name).core_trial])
+# The compiled trial of actor-critic has no running ranges, which the agent in Python has.
+EQUAL_AGENTS = [label for label in labels() if not label.startswith("actor-critic")]
+
+
+@pytest.mark.parametrize("agent", EQUAL_AGENTS)
 @pytest.mark.parametrize(("n_sensors", "noise"), [(4, 0.0), (4, 0.02), (5, 0.02), (6, 0.02)])
 def test_a_trial_in_python_has_the_bits_of_the_compiled_trial(agent, n_sensors, noise, monkeypatch):
     spec = spec_of(agent, n_sensors, noise)
