@@ -123,8 +123,9 @@ def train(
 
         click.echo(json.dumps(spec_schema(), indent=2))
         return
-    from sdnn.runs.config_file import ConfigFile, overridden
+    from sdnn.runs.config_file import ConfigFile
     from sdnn.runs.run import Run, resume_command
+    from sdnn.runs.settings import overridden
     from sdnn.runs.spec import RunSpec
 
     settings = _options_by_key(env_id, options)

@@ -30,11 +30,10 @@ from sdnn.reproduction.claims import ClaimOutcome, TenTrials, judge_claims, more
 from sdnn.reproduction.cost import CostConfig
 from sdnn.reproduction.figures import draw_cost, draw_experiment
 from sdnn.reproduction.report import CHECKS_HEADER, RULE_NOTE, VERDICT_KINDS, Report, check_rows
-from sdnn.runs.config_file import overridden
 from sdnn.runs.engine import Observer, PlannedTrial
 from sdnn.runs.report import Content, format_estimate
 from sdnn.runs.results import CaseResult
-from sdnn.runs.settings import Values
+from sdnn.runs.settings import Values, overridden
 from sdnn.runs.spec import RunSpec
 from sdnn.runs.store import STORE_NAME, ResultStore
 from sdnn.runs.study import Comparison, Layer, Setting, Study, StudyCase, StudyVariant

@@ -23,6 +23,7 @@ from sdnn.support.machine import instruction_set
 MOST_BYTES = 2**26  # size of the largest file
 
 Word = Annotated[str, Meta(max_length=1000)]
+"""A short text: certificates of others are not trusted, and their sizes are limited."""
 
 
 class CertifiedTrial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

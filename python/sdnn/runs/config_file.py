@@ -1,13 +1,12 @@
-"""Files of settings, in TOML or JSON: values, places of keys, overrides, and their JSON Schema."""
+"""Files of settings, in TOML or JSON: their values, where each key is, and their JSON Schema."""
 
 from __future__ import annotations
 
-import copy
 import itertools
 import json
 import math
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, get_type_hints
@@ -19,7 +18,7 @@ from sdnn.config import Field, fields_of
 from sdnn.environments.paper_acrobot import PAPER_ACROBOT
 from sdnn.runs.environment import PaperSettings
 from sdnn.runs.errors import ConfigError
-from sdnn.runs.settings import SHORTHANDS, Values, schemas_of
+from sdnn.runs.settings import Values, schemas_of
 from sdnn.runs.spec import RunSpec
 from sdnn.support.files import read_bytes
 from sdnn.support.toml import TOO_DEEP, KeyPath, deep_key, dotted, line_of, parse_toml
@@ -103,41 +102,6 @@ def read_spec(path: str | Path) -> RunSpec:
         return RunSpec.from_values(file.specification())
     except ConfigError as error:
         raise file.located(error) from error
-
-
-_REPLACED = {
-    "budget.steps": "budget.episodes",
-    "budget.episodes": "budget.steps",
-    "protocol.evaluate_every": "protocol.evaluate_every_episodes",
-    "protocol.evaluate_every_episodes": "protocol.evaluate_every",
-    "agent.name": "agent.preset",
-}
-"""The key of a file, by the key of the option that removes it, since the two conflict."""
-
-
-def overridden(values: Mapping[str, object], options: Mapping[str, object]) -> Values:
-    """Return the values of a file with those of options, by dotted keys, in their place.
-
-    >>> overridden({"agent": "rbf", "budget": {"steps": 9}}, {"budget.episodes": 3})
-    {'agent': {'name': 'rbf'}, 'budget': {'episodes': 3}}
-    """
-    settings: Values = copy.deepcopy(dict(values))
-    for name, key in SHORTHANDS.items():
-        if isinstance(settings.get(name), str):
-            settings[name] = {key: settings[name]}
-    for key in options:  # remove keys of the file that conflict with an option
-        table, _, name = _REPLACED.get(key, "").partition(".")
-        if isinstance(settings.get(table), dict):
-            settings[table].pop(name, None)
-    for key, value in options.items():
-        *parents, last = key.split(".")
-        inner = settings
-        for parent in parents:
-            if not isinstance(inner.get(parent), dict):
-                inner[parent] = {}
-            inner = inner[parent]
-        inner[last] = value
-    return settings
 
 
 # The JSON Schema of such files, for editors and documentation.

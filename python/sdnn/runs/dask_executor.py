@@ -64,7 +64,7 @@ def probe(planned: PlannedTrial) -> str:
 
 def probes_of(planned: Sequence[PlannedTrial]) -> list[tuple[bytes, str]]:
     """Pickle one trial per agent with its `probe`; ClusterError if one cannot be pickled."""
-    # Of each agent the first trial in the plan, since later ones are replaced.
+    # Take the first trial of each agent: in reverse order it replaces the others.
     examples = {(trial.key.agent, trial.spec.is_compiled): trial for trial in reversed(planned)}
     try:
         return [(pickle.dumps(trial), probe(trial)) for trial in examples.values()]

@@ -219,7 +219,7 @@ class EnvironmentSpec(Settings, frozen=True):
             env = NoisySensors(env, self.noise, edge="saturate", stream=stream)
         return in_own_units(env, low, high) if self.own_units else env
 
-    def imported(self) -> bool:
+    def import_module(self) -> bool:
         """Import the module that ``id`` names; return whether a module was imported now.
 
         ConfigError if it cannot be imported.

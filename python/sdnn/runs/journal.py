@@ -1,4 +1,4 @@
-"""Connections to the SQLite file of a store, and journals that killed processes leave beside it."""
+"""Journals that killed processes leave beside the SQLite file of a store."""
 
 from __future__ import annotations
 
@@ -10,28 +10,9 @@ from pathlib import Path
 from sdnn.support.files import is_there
 
 BUSY_SECONDS = 60.0  # seconds to wait for another process that writes the same file
-MOST_BYTES_OF_VALUE = 2**24  # longest text in the file
 
 _MAGIC_OF_JOURNAL = bytes.fromhex("d9d505f920a163d7")
 """First bytes of a journal; also its last bytes if it names a super-journal."""
-
-
-def connect(path: Path | None, *, read_only: bool = False) -> sqlite3.Connection:
-    """Open a file, or a database in memory, with SQLite's protection against hostile schemas."""
-    place = ":memory:"
-    if path is not None:
-        place = f"{path.absolute().as_uri()}?mode={'ro' if read_only else 'rwc'}"
-    connection = sqlite3.connect(place, uri=path is not None, timeout=BUSY_SECONDS)
-    try:
-        for setting in ("trusted_schema = OFF", "cell_size_check = ON", "mmap_size = 0"):
-            connection.execute(f"PRAGMA {setting}")
-        connection.execute(f"PRAGMA query_only = {int(read_only)}")
-        connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MOST_BYTES_OF_VALUE)
-        connection.setlimit(sqlite3.SQLITE_LIMIT_ATTACHED, 0)
-    except BaseException:
-        connection.close()
-        raise
-    return connection
 
 
 def is_hot(path: Path, journal: Path) -> bool:
@@ -51,7 +32,7 @@ def is_hot(path: Path, journal: Path) -> bool:
             connection.execute("PRAGMA user_version").fetchone()
     except sqlite3.OperationalError as error:
         if error.sqlite_errorcode == sqlite3.SQLITE_READONLY_ROLLBACK:
-            return True
+            return True  # SQLite would have to write: to roll the transaction back
         if is_there(path):
             raise
     return False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import functools
 import math
@@ -152,11 +153,7 @@ def _alternatives(value_type: object) -> tuple[object, ...]:
 
 
 def _expected_value(possible: Iterable[object], text: str) -> str:
-    """Return "must be ..." for one of the possible types, from the text of msgspec's error.
-
-    >>> _expected_value([int], "Expected `int`, got `str`")
-    'must be a whole number'
-    """
+    """Return "must be ..." for one of the possible types, from the text of msgspec's error."""
     literals = [form for form in possible if get_origin(form) is Literal]
     if literals:  # msgspec does not list them
         choices = ", ".join(repr(word) for literal in literals for word in get_args(literal))
@@ -178,8 +175,7 @@ def check_names(
     for name in values:
         if name not in known:
             path = _path(where, name)
-            # The unknown key itself is no suggestion, such as "learning.epsilon" for an agent
-            # whose `learning` lacks epsilon.
+            # Do not suggest the unknown key itself: other agents may have it.
             others = {last: key for last, key in KEYS_BY_NAME.items() if not path.endswith(key)}
             raise UnknownKeyError(path, f"unknown key; {advice(str(name), known, others)}{hint}")
     return values
@@ -233,9 +229,7 @@ def with_changes(base: AnyPart, values: object, where: str, hint: str = "") -> A
 def differences(
     values: Mapping[str, object], defaults: Mapping[str, object], always: Collection[str] = ()
 ) -> Values:
-    """Return the values that differ from the default, also in tables.
-
-    Values whose name is in ``always`` are kept even if they are the default.
+    """Return the values that differ from the default, also in tables, and names in ``always``.
 
     >>> differences({"a": 1, "b": {"c": 2, "d": 3}}, {"a": 1, "b": {"c": 2, "d": 4}})
     {'b': {'d': 3}}
@@ -260,8 +254,7 @@ def with_n_inputs(approximator: PartSettings, n_inputs: int) -> PartSettings:
 
 def _path(table: str, name: str) -> str:
     """Join the key of a table and a name, or an index such as "[0]"; either may be empty."""
-    needs_dot = table and name and not name.startswith("[")
-    return f"{table}.{name}" if needs_dot else table + name
+    return f"{table}.{name}" if table and name and name[0] != "[" else table + name
 
 
 # The tables of a specification but those of the core and the environment.
@@ -425,3 +418,33 @@ KEYS_BY_NAME = {"environment": "environment", "agent": "agent", "seed": "seed"} 
     for name in names_of(settings_class)
 }
 """The keys of a specification, with dots between tables, by their last part."""
+
+_REPLACED = {
+    "budget.steps": "budget.episodes",
+    "budget.episodes": "budget.steps",
+    "protocol.evaluate_every": "protocol.evaluate_every_episodes",
+    "protocol.evaluate_every_episodes": "protocol.evaluate_every",
+    "agent.name": "agent.preset",
+}
+"""The key of a file, by the key of the option that removes it, since the two conflict."""
+
+
+def overridden(values: Mapping[str, object], options: Mapping[str, object]) -> Values:
+    """Return the values of a file with those of options, by dotted keys, in their place."""
+    settings: Values = copy.deepcopy(dict(values))
+    for name, key in SHORTHANDS.items():
+        if isinstance(settings.get(name), str):
+            settings[name] = {key: settings[name]}
+    for key in options:  # remove keys of the file that conflict with an option
+        table, _, name = _REPLACED.get(key, "").partition(".")
+        if isinstance(settings.get(table), dict):
+            settings[table].pop(name, None)
+    for key, value in options.items():
+        *parents, last = key.split(".")
+        inner = settings
+        for parent in parents:
+            if not isinstance(inner.get(parent), dict):
+                inner[parent] = {}
+            inner = inner[parent]
+        inner[last] = value
+    return settings

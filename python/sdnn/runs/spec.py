@@ -135,7 +135,7 @@ class RunSpec(Settings, frozen=True):
         try:
             name, preset_in_label = split_label(label)
         except ValueError as error:
-            if not self.environment.imported():
+            if not self.environment.import_module():
                 raise ConfigError("agent.name", blamed(error)[1]) from None
             return self._chosen_agent()  # the environment's module may have registered the agent
         if preset_in_label is not None and preset not in (None, preset_in_label):

@@ -13,7 +13,7 @@ import sqlite3
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
-from functools import cache, lru_cache
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -23,8 +23,8 @@ import msgspec
 import numpy as np
 
 from sdnn.runs.errors import ChangedRowsError, StoreError
-from sdnn.runs.journal import connect, foreign_journal, has_rows, is_hot
-from sdnn.runs.trial import ROW, Hash, TrialKey, TrialRecord, TrialRows, config_hash as hash_of
+from sdnn.runs.journal import BUSY_SECONDS, foreign_journal, has_rows, is_hot
+from sdnn.runs.trial import ROW, Hash, TrialKey, TrialRecord, TrialRows, problem_of_config
 from sdnn.support.files import is_there, open_regular
 
 Rows = TypeVar("Rows")
@@ -34,6 +34,7 @@ SCHEMA_VERSION = 6
 APPLICATION_ID = int.from_bytes(b"sdnn", "big")
 """Value of SQLite's header field ``application_id`` in files of this library."""
 MOST_BYTES = 2**37  # largest file: SQLite's integrity check needs memory, a bit for each page
+MOST_BYTES_OF_VALUE = 2**24  # longest text in the file
 MOST_MEASUREMENTS = 10**5  # a report has only some hundreds
 _SCHEMA = files("sdnn.runs").joinpath("schema.sql").read_text("utf-8")
 
@@ -269,7 +270,7 @@ class ResultStore(AbstractContextManager["ResultStore"]):
         rest = "ORDER BY id" if key is None else f"WHERE {_KEY}"
         runs = self._read(list[_Run], "*", "runs", rest, *([] if key is None else _stored(key)))
         for run in runs:
-            problem = _problem_of_config(run.config, run.config_hash)
+            problem = problem_of_config(run.config, run.config_hash)
             if run.crc != _crc(run[:-1]):
                 problem = "a value does not fit its checksum, crc"
             if problem:
@@ -292,18 +293,11 @@ class ResultStore(AbstractContextManager["ResultStore"]):
         """Update the columns of a run that may change, and their checksum."""
         # SQLite stores Python's numbers only, not those of NumPy.
         run = run._replace(n_decisions=int(run.n_decisions), seconds=float(run.seconds))
+        values = (run.version, run.n_decisions, run.seconds, run.finished_at, run.checksum)
         self._connection.execute(
             "UPDATE runs SET version = ?, n_decisions = ?, seconds = ?, finished_at = ?,"
             " checksum = ?, crc = ? WHERE id = ?",
-            (
-                run.version,
-                run.n_decisions,
-                run.seconds,
-                run.finished_at,
-                run.checksum,
-                _crc(run[:-1]),
-                run.id,
-            ),
+            (*values, _crc(run[:-1]), run.id),
         )
 
     def _insert(self, run_id: int, rows: TrialRows) -> None:
@@ -367,18 +361,6 @@ def _crc(values: tuple[object, ...]) -> int:
     return zlib.crc32(repr(values).encode("utf-8", "surrogatepass"))
 
 
-@lru_cache(maxsize=1024)
-def _problem_of_config(config: str, config_hash: str) -> str:
-    """Return the problem of a stored configuration, or ""."""
-    if hash_of(config) != config_hash:
-        return "config does not have the hash beside it, config_hash"
-    try:
-        is_table = isinstance(json.loads(config), dict)
-    except (RecursionError, ValueError):
-        is_table = False
-    return "" if is_table else "config must be a table in JSON"
-
-
 def _stored(key: TrialKey) -> TrialKey:
     """Return a key with the seed as a signed integer, the only integers that SQLite stores."""
     return key._replace(seed=key.seed - 2**64 if key.seed >= 2**63 else key.seed)
@@ -432,6 +414,24 @@ def _own_objects() -> set[tuple[str | None, ...]]:
     with closing(sqlite3.connect(":memory:")) as connection:
         connection.executescript(_SCHEMA)
         return _objects(connection)
+
+
+def connect(path: Path | None, *, read_only: bool = False) -> sqlite3.Connection:
+    """Open a file, or a database in memory, with SQLite's protection against hostile schemas."""
+    place = ":memory:"
+    if path is not None:
+        place = f"{path.absolute().as_uri()}?mode={'ro' if read_only else 'rwc'}"
+    connection = sqlite3.connect(place, uri=path is not None, timeout=BUSY_SECONDS)
+    try:
+        for setting in ("trusted_schema = OFF", "cell_size_check = ON", "mmap_size = 0"):
+            connection.execute(f"PRAGMA {setting}")
+        connection.execute(f"PRAGMA query_only = {int(read_only)}")
+        connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MOST_BYTES_OF_VALUE)
+        connection.setlimit(sqlite3.SQLITE_LIMIT_ATTACHED, 0)
+    except BaseException:
+        connection.close()
+        raise
+    return connection
 
 
 @contextmanager

@@ -16,7 +16,7 @@ import msgspec
 from msgspec import Meta
 
 from sdnn.agents.registry import labels, split_label
-from sdnn.runs.config_file import ConfigFile, overridden
+from sdnn.runs.config_file import ConfigFile
 from sdnn.runs.environment import find_module, search_folder
 from sdnn.runs.errors import ConfigError
 from sdnn.runs.report import Content
@@ -28,6 +28,7 @@ from sdnn.runs.settings import (
     check_names,
     convert_value,
     doc,
+    overridden,
     read_table,
 )
 from sdnn.runs.spec import RunSpec

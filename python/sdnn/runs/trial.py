@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Literal, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
@@ -35,7 +35,11 @@ ROW_HEADER = (
 
 
 class TrialKey(NamedTuple):
-    """The identity of a trial: it is stored once and never run again."""
+    """The identity of a trial: it is stored once and never run again.
+
+    ``agent`` is its label, such as ``"sdnn-c-robust"``; ``trial`` its number in the case, from 0;
+    ``seed`` its own seed, see `trial_seed`.
+    """
 
     case_id: str
     agent: str
@@ -89,6 +93,18 @@ def config_hash(text: str) -> str:
     True
     """
     return hashlib.sha256(text.encode()).hexdigest()[:HASH_DIGITS]
+
+
+@lru_cache(maxsize=1024)
+def problem_of_config(config: str, expected_hash: str) -> str:
+    """Return what is wrong with a stored configuration and the hash beside it, or ""."""
+    if config_hash(config) != expected_hash:
+        return "config does not have the hash beside it, config_hash"
+    try:
+        is_table = isinstance(json.loads(config), dict)
+    except (RecursionError, ValueError):
+        is_table = False
+    return "" if is_table else "config must be a table in JSON"
 
 
 ROW = np.dtype(
