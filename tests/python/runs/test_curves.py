@@ -18,7 +18,10 @@ CONFIG = run_spec(environment=EnvironmentSpec(id="CartPole-v1"))
 
 
 def fake_run(folder, config, returns=(), evaluations=(), evaluate_every=20):
-    """Make a run without training: returns of episodes of 10 steps, and those of evaluations."""
+    """Make a run without training: with the returns of episodes, of 10 steps each.
+
+    ``evaluations`` lists the returns of each evaluation; one comes every ``evaluate_every`` steps.
+    """
     run = Run.create(folder, config)
     rows = [
         {"kind": "episode", "step": 10 * n, "episode": n - 1, "return": float(value), "length": 10,

@@ -59,17 +59,19 @@ def closed_port():
         yield server.getsockname()[1]  # bound, but nobody listens
 
 
-@pytest.mark.parametrize("problem", ["closed port", "scheme", "missing file", "malformed file"])
-def test_errors_of_the_connection_name_the_scheduler(tmp_path, closed_port, problem):
-    path = tmp_path / "scheduler.json"
-    scheduler = {
-        "closed port": f"127.0.0.1:{closed_port}",
-        "scheme": "carrier-pigeon://loft",
-        "missing file": str(path),
-        "malformed file": str(path),
-    }[problem]
-    if problem == "malformed file":
-        path.write_text("[]")
+@pytest.mark.parametrize(
+    ("scheduler", "content"),
+    [
+        pytest.param("127.0.0.1:{port}", "", id="closed port"),
+        pytest.param("carrier-pigeon://loft", "", id="scheme"),
+        pytest.param("{folder}/scheduler.json", "", id="missing file"),
+        pytest.param("{folder}/scheduler.json", "[]", id="malformed file"),
+    ],
+)
+def test_errors_of_the_connection_name_the_scheduler(tmp_path, closed_port, scheduler, content):
+    scheduler = scheduler.format(port=closed_port, folder=tmp_path)
+    if content:
+        (tmp_path / "scheduler.json").write_text(content)
     executor = DaskExecutor(scheduler, scheduler_timeout=1.0)
     with pytest.raises(ClusterError) as caught:
         list(executor.run(plan_two_trials(), threading.Event()))

@@ -12,7 +12,7 @@ import pytest
 from sdnn.runs import Run, RunError
 from sdnn.runs.inspection import inspect_run
 
-MOST_BYTES = 2 * 10**6
+MOST_BYTES = 2 * 10**6  # of a page: a chosen limit
 
 
 class DockEnv(gym.Env):

@@ -67,7 +67,8 @@ def test_noise_is_a_share_of_the_range_and_reproducible_by_seed():
     env = environment.make()
     assert isinstance(env, NoisySensors)
 
-    def errors(env, seed):  # shape (40, 3): steps, two variables and their mean
+    def errors(env, seed):
+        """Return the noise of two variables and of their mean in 40 steps, (40, 3)."""
         differences = []
         observation, _ = env.reset(seed=seed)
         for _ in range(40):

@@ -265,7 +265,7 @@ def test_runs_are_repeated_with_the_goals_that_were_set_later(invoke, output_of)
     options = ("--steps", 150, *SMALL, "--seed", 3)
     train = ("train", "drifting_env:tests/Drifting-v0", *options)
     verified = ("verify", "--import", "drifting_env")
-    for name, more in (("one", ()), ("several", ("--n-envs", 3))):
+    for name, more in (("one", ()), ("several", ("--n-envs", 3))):  # environments
         output_of(*train, *more, "--out", name)
         output_of(*verified, name)
         output_of("resume", name, "--steps", 250)
