@@ -103,10 +103,10 @@ def option_words(error: ConfigError) -> str:
     """Return an error's message, with the option in place of the key."""
     option = option_of(error.key)
     if isinstance(error, UnknownKeyError) and option.startswith("--set"):
-        options = ways_to_set(click.get_current_context())
-        meant = options.get(error.key.rpartition(".")[2].replace("-", "_"), "--set")
-        if not meant.startswith("--set"):
-            return f"{option}: unknown key; did you mean {meant}?"
+        name = error.key.rpartition(".")[2].replace("-", "_")
+        intended = ways_to_set(click.get_current_context()).get(name, "--set")
+        if not intended.startswith("--set"):  # the key is the name of a dedicated option
+            return f"{option}: unknown key; did you mean {intended}?"
     return f"{option}: {error.problem}"
 
 

@@ -187,10 +187,10 @@ def _options_by_key(env_id: str | None, options: common.Options) -> common.Optio
             set_once(f"--range {name}", f"environment.ranges.{name}", bounds)
     for name, text in common.named_values("--set", options["settings"]):
         table, dot, _ = name.partition(".")
-        if not dot or table not in tables:
-            expected = (
-                f"TABLE.NAME with one of the tables {', '.join(tables)}" if dot else "TABLE.NAME"
-            )
+        if not dot:
+            raise common.error_of_set(name, "TABLE.NAME")
+        if table not in tables:
+            expected = f"TABLE.NAME with one of the tables {', '.join(tables)}"
             raise common.error_of_set(name, expected)
         set_once(f"--set {name}", name, common.value_of(text))
     return values

@@ -174,7 +174,7 @@ def check_names(
     known = tuple(possible)
     for name in values:
         if name not in known:
-            path = _path(where, name)
+            path = _path(where, str(name))
             # Do not suggest the unknown key itself: other agents may have it.
             others = {last: key for last, key in KEYS_BY_NAME.items() if not path.endswith(key)}
             raise UnknownKeyError(path, f"unknown key; {advice(str(name), known, others)}{hint}")
