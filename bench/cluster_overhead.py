@@ -5,7 +5,7 @@
 A real scheduler and workers on this machine run trials that only wait some seconds, and return as
 many rows as a trial of the paper has. Printed are the recorded trials a second, the processor time
 of driver, scheduler and workers for each trial, and the memory of the scheduler as trials end. The
-same without a cluster tells what the store takes of it.
+same without a cluster shows the share of the store.
 """
 
 from __future__ import annotations

@@ -97,7 +97,9 @@ def measure_missing(
     *,
     apart: bool = False,
 ) -> None:
-    """Measure what is not stored; each result is stored at once, and an error ends none but itself.
+    """Measure what is not stored; store each result immediately.
+
+    A measurement that fails is reported, and does not stop the others.
 
     Parameters
     ----------

@@ -124,7 +124,7 @@ def main():
     keeping.add_argument(
         "--keep",
         type=int,
-        help="Keep the best policy, measured by so many greedy episodes each 2,000 steps.",
+        help="Keep the best policy, measured by this number of greedy episodes each 2,000 steps.",
     )
     keeping.add_argument(
         "--keep-block", type=int, help="Keep the best policy by blocks of learned episodes."

@@ -77,7 +77,7 @@ class Network:
                 row[generator.permutation(n_inputs)[:n_zeros]] = 0.0
 
     def outputs(self, inputs, keep: bool = False):
-        """Compute the outputs; those of which a gradient is to be had are kept."""
+        """Compute the outputs, (n_outputs,); with `keep` all layers stay for `add_gradient`."""
         kept = [inputs]
         for layer in range(2):
             sums = self._weights[2 * layer] @ inputs + self._weights[2 * layer + 1]
@@ -91,7 +91,10 @@ class Network:
         return self._weights[4] @ inputs + self._weights[5]
 
     def add_gradient(self, slopes) -> None:
-        """Add the gradient of what has these slopes at the kept outputs to the trace."""
+        """Add a gradient to the trace, after the trace has decayed.
+
+        It is that of a function of the kept outputs with these slopes by them, (n_outputs,).
+        """
         inputs, first, first_deviation, first_out, second, second_deviation, second_out = self._kept
         self._slope(2, slopes, second_out)
         slopes = _before_unit(self._weights[4].T @ slopes, second, second_deviation)
@@ -102,6 +105,7 @@ class Network:
         self._trace += self._gradient
 
     def _slope(self, layer, slopes, inputs):
+        """Set the gradient of a layer's weights and biases from the slopes by its sums."""
         np.multiply.outer(slopes, inputs, out=self._slopes[2 * layer])
         self._slopes[2 * layer + 1][:] = slopes
 
@@ -118,31 +122,35 @@ class Network:
 
 
 def _before_unit(slopes, normalized, deviation):
-    """Return slopes of a layer's sums, given those of its leaky units."""
+    """Return slopes by a layer's sums from those by its units: backwards through leak and norm."""
     slopes = np.where(normalized > 0, slopes, SLOPE * slopes)
     along = float(slopes @ normalized) / slopes.size
     return (slopes - slopes.mean() - normalized * along) / deviation
 
 
 class Softmax:
-    """Chances of listed actions."""
+    """Probabilities of discrete actions."""
 
     def __init__(self, space: gym.spaces.Discrete) -> None:
         self.n_outputs = int(space.n)
 
     def sample(self, outputs, generator):
         """Draw an action."""
-        self._chances = np.exp(outputs - outputs.max())
-        self._chances /= self._chances.sum()
-        action = int(np.searchsorted(np.cumsum(self._chances), generator.random()))
-        self._action = min(action, self.n_outputs - 1)
+        self._probabilities = np.exp(outputs - outputs.max())
+        self._probabilities /= self._probabilities.sum()
+        action = int(np.searchsorted(np.cumsum(self._probabilities), generator.random()))
+        self._action = min(action, self.n_outputs - 1)  # rounding may leave the sum below 1
         return self._action
 
     def slopes(self, entropy: float):
-        """Slopes of the drawn action's logarithmic chance and of so many entropies."""
-        chances = self._chances
-        logarithms = np.log(np.maximum(chances, 1e-30))
-        slopes = -chances * (1.0 + entropy * (logarithms - float(chances @ logarithms)))
+        """Return slopes by the outputs, (n_outputs,), of what a policy gradient follows.
+
+        It is the drawn action's log-probability plus `entropy` times the distribution's entropy.
+        """
+        probabilities = self._probabilities
+        logarithms = np.log(np.maximum(probabilities, 1e-30))
+        mean_logarithm = float(probabilities @ logarithms)
+        slopes = -probabilities * (1.0 + entropy * (logarithms - mean_logarithm))
         slopes[self._action] += 1.0
         return slopes
 
@@ -166,7 +174,7 @@ class Normal:
         return self._of_space(outputs[: self._n] + self._off)
 
     def slopes(self, entropy: float):
-        """Slopes of the drawn action's logarithmic density and of so many entropies."""
+        """Return slopes as `Softmax.slopes` does, of the logarithm of the density."""
         ratio = self._off / self._deviation
         of_deviation = (ratio * ratio - 1.0 + entropy) / self._deviation
         sigmoid = -np.expm1(-self._deviation)  # the slope of log(1 + e^x)
@@ -177,6 +185,7 @@ class Normal:
         return self._of_space(outputs[: self._n])
 
     def _of_space(self, parts):
+        """Return the action with these parts of half the range from its middle, clipped."""
         middle, half = (self._high + self._low) / 2, (self._high - self._low) / 2
         return np.clip(middle + half * parts, self._low, self._high).astype(np.float32)
 

@@ -48,7 +48,7 @@ class TileCoding:
         self.n_tiles = n_tilings * (n_bins + 1) ** n_inputs
 
     def __call__(self, unit):
-        """The active tiles, one of each grid, shape (n_tilings,); of several rows together, too."""
+        """Return the active tiles, one of each grid: (n_tilings,), or (..., n_tilings) of rows."""
         tile = np.floor(np.clip(unit, 0.0, 1.0) * self._n_bins + self._offset).astype(np.int64)
         return self._first + tile @ self._stride
 
@@ -63,7 +63,7 @@ class PairTiles:
         self.n_tiles = self._code.n_tiles * len(self._pairs)
 
     def __call__(self, unit):
-        """The active tiles, one of each grid of each pair, shape (n_pairs * n_tilings,)."""
+        """Return the active tiles, one of each grid of each pair, (n_pairs * n_tilings,)."""
         return (self._code(unit[self._pairs][:, None]) + self._first[:, None]).ravel()
 
 
@@ -76,7 +76,7 @@ class HashedTiles(TileCoding):
         self._stride, self._first, self.n_tiles = mixed[:n_inputs], mixed[n_inputs:], n_tiles
 
     def __call__(self, unit):
-        """The active tiles, one of each grid, shape (n_tilings,)."""
+        """Return the active tiles, one of each grid, shape (n_tilings,)."""
         mixed = super().__call__(unit).view(np.uint64) >> np.uint64(8)
         return (mixed % np.uint64(self.n_tiles)).astype(np.int64)
 
@@ -88,7 +88,7 @@ class Table:
         self.n_tiles = n_tiles
 
     def __call__(self, observation):
-        """The tile of an observation, shape (1,)."""
+        """Return the tile of an observation, shape (1,)."""
         return np.array([observation])
 
 
