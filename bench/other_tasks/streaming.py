@@ -30,13 +30,13 @@ LAYER_EPSILON, MOMENTS_EPSILON = 1e-5, 1e-8
 
 
 class Moments:
-    """Mean and variance of all that was seen (Welford)."""
+    """Mean and variance of all values so far (Welford's algorithm)."""
 
     def __init__(self, shape: tuple[int, ...] = ()) -> None:
         self._n, self.mean, self._sum = 0, np.zeros(shape), np.zeros(shape)
 
     def update(self, value) -> None:
-        """See one more."""
+        """Add a value."""
         self._n += 1
         before = value - self.mean
         self.mean = self.mean + before / self._n
@@ -210,25 +210,30 @@ class Streaming:
         n_inputs = gym.spaces.flatdim(observation_space)
         self._rng = np.random.default_rng(seed)
         self.networks = [Network(n_inputs, *sizes) for sizes in networks(self._rng)]
-        self._seen, self._returns, self._discounted = Moments((n_inputs,)), Moments(), 0.0
-        self._state = self._step = None
+        self._observation_moments, self._return_moments = Moments((n_inputs,)), Moments()
+        self._discounted = 0.0  # discounted sum of the rewards so far, whose deviation scales them
+        self._state = None  # the present observation, normalized
+        self._step = None  # the pending transition
 
     @property
     def n_bytes(self) -> int:
-        """Bytes of weights, and of as many traces."""
+        """Bytes of the weights and their traces, one for each."""
         return 2 * sum(network.parameters.nbytes for network in self.networks)
 
     def _normalized(self, observation):
-        return ((observation - self._seen.mean) / self._seen.deviation).astype(np.float32)
+        return (
+            (observation - self._observation_moments.mean) / self._observation_moments.deviation
+        ).astype(np.float32)
 
-    def _see(self, observation):
+    def _normalize_new(self, observation):
+        """Add an observation to the moments, and return it normalized by them."""
         observation = gym.spaces.flatten(self._space, observation)
-        self._seen.update(observation)
+        self._observation_moments.update(observation)
         return self._normalized(observation)
 
     def begin_episode(self) -> None:
         """Learn the last step of the one before, and forget the traces."""
-        self._learn_waiting(is_over=True)
+        self._learn_pending(is_over=True)
         for network in self.networks:
             network.end_episode()
         self._state = None
@@ -238,24 +243,25 @@ class Streaming:
         if not explore:
             observation = gym.spaces.flatten(self._space, observation)
             return self._greedy(self.networks[0].outputs(self._normalized(observation)))
-        self._learn_waiting(is_over=False)
+        self._learn_pending(is_over=False)
         if self._state is None:
-            self._state = self._see(observation)
+            self._state = self._normalize_new(observation)
         return self._sample(self.networks[0].outputs(self._state, keep=True))
 
     def learn(self, transition) -> None:
         """Keep a step."""
         self._step = transition
 
-    def _learn_waiting(self, is_over: bool) -> None:
+    def _learn_pending(self, is_over: bool) -> None:
+        """Learn the pending transition, if there is one; ``is_over``: its episode has ended."""
         if self._step is None:
             return
         step, self._step = self._step, None
         reward, observation, terminated = step.reward, step.next_observation, step.terminated
         self._discounted = DISCOUNT * self._discounted * (not is_over) + reward
-        self._returns.update(self._discounted)
-        next_state = self._see(observation)
-        scaled = reward / float(self._returns.deviation)
+        self._return_moments.update(self._discounted)
+        next_state = self._normalize_new(observation)
+        scaled = reward / float(self._return_moments.deviation)
         self._update(scaled, next_state, DISCOUNT * (not terminated))
         self._state = next_state
 

@@ -141,7 +141,7 @@ class QLambdaConfig:
 class TileCodingSarsa:
     """Sarsa(lambda) with replacing traces, over `listed_actions`.
 
-    Variables without ends are squashed by the arc tangent.
+    Variables without finite bounds are mapped to (0, 1) by the arc tangent.
     """
 
     n_numbers = 1
@@ -151,9 +151,9 @@ class TileCodingSarsa:
         self, observation_space, action_space, *, approximator, learning, seed,
         observation_range=None,
     ) -> None:  # fmt: skip
-        ends = flat_bounds(observation_space) if observation_range is None else observation_range
-        self._is_finite = np.isfinite(np.subtract(ends[1], ends[0]))
-        self._low, self._high = np.where(self._is_finite, ends, [[0.0], [1.0]])
+        bounds = flat_bounds(observation_space) if observation_range is None else observation_range
+        self._is_finite = np.isfinite(np.subtract(bounds[1], bounds[0]))
+        self._low, self._high = np.where(self._is_finite, bounds, [[0.0], [1.0]])
         self._code = code_of(observation_space, approximator)
         self._actions = listed_actions(action_space)
         if 8 * self.n_numbers * len(self._actions) * self._code.n_tiles > MOST_BYTES:
@@ -166,7 +166,7 @@ class TileCodingSarsa:
         self._epsilons = learning.epsilon, learning.final_epsilon
         self.progress = 0.0
         self._rng = np.random.default_rng(seed)
-        # Traces below a hundredth are forgotten.
+        # Traces below a hundredth are dropped; the hundredth is chosen.
         n_kept = 1 if self._fade == 0 else int(np.ceil(np.log(0.01) / np.log(self._fade)))
         self._fades = self._fade ** np.arange(n_kept)
         self._recent = np.full((n_kept, n_active), -1)  # tiles of the last steps, a ring
