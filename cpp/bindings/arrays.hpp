@@ -1,4 +1,4 @@
-/// Between NumPy arrays and spans: views in, copies out.
+/// Conversions between NumPy arrays and spans: arguments become views, results are copies.
 #pragma once
 
 #include <pybind11/numpy.h>

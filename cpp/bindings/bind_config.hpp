@@ -287,7 +287,7 @@ inline std::string docstring(const char* doc, std::span<const Field> fields) {
          " bounds; ``argument`` is its name.\n";
 }
 
-/// "name=value, ..." of all fields.
+/// Lists all fields as a text such as "n_inputs=4, n_sets=9".
 inline std::string listed(std::span<const Field> fields) {
   std::string values;
   for (const Field& field : fields) {

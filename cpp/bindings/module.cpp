@@ -1,4 +1,4 @@
-// The extension's table of contents: one line per package, layer by layer.
+// The extension module, which binds one package after the other, from the lowest layer up.
 #include <pybind11/pybind11.h>
 
 #include <exception>

@@ -80,7 +80,7 @@ struct Use {
     return {owner, begin, begin + sizeof(Object), access_to<Object>()};
   }
 
-  /// Describes the use of parts that an object holds elsewhere.
+  /// Describes the use of memory that belongs to an object but lies outside it, such as networks.
   template <class Part>
   static Use of(const void* owner, const std::span<Part>& parts) noexcept {
     const auto bytes = std::as_bytes(parts);
@@ -161,10 +161,12 @@ class ListedUses {
 /// them.
 class WithoutGIL {
  public:
-  /// Throws std::runtime_error if another thread's call is in the way.
+  /// Lists the uses of the objects. Throws std::runtime_error if a call in another thread is
+  /// changing an object, or is reading an object that this call will change.
   template <class... Object>
   explicit WithoutGIL(Object&... objects) : uses_(this, checked({Use::of(this, objects)...})) {}
-  /// Releases the lock for numbers of objects and parts that are known only at run time.
+  /// Does the same for objects and parts (memory outside the objects) whose number is known only at
+  /// run time.
   template <class Object, class Part>
   WithoutGIL(const std::vector<Object*>& objects, const std::vector<std::span<Part>>& parts)
       : uses_(this, checked(of_all(objects, parts))) {}
@@ -172,7 +174,7 @@ class WithoutGIL {
   WithoutGIL& operator=(const WithoutGIL&) = delete;
 
  private:
-  /// The uses, by this reader, of whole objects and of arrays inside objects.
+  /// Describes the uses of objects, and of parts that lie outside them.
   template <class Object, class Part>
   std::vector<Use> of_all(const std::vector<Object*>& objects,
                           const std::vector<std::span<Part>>& parts) const {
@@ -182,7 +184,7 @@ class WithoutGIL {
     return uses;
   }
 
-  /// Returns the uses; throws std::runtime_error if another thread's call is in the way.
+  /// Returns the uses if no other call conflicts with them; see require_unused.
   static std::vector<Use> checked(std::vector<Use> uses) {
     for (const Use& use : uses) require_unused(use, "object");
     return uses;

@@ -1,4 +1,4 @@
-/// Between an object's state and a dictionary of NumPy arrays.
+/// Conversions between an object's state and a dictionary of NumPy arrays.
 #pragma once
 
 #include <pybind11/numpy.h>

@@ -124,7 +124,7 @@ class OnlineLayer {
   }
 
  private:
-  /// The corrections of units in a direction, by a sample.
+  /// A recorded correction: the units that a sample corrected in a direction, +1 or -1.
   struct Applied {
     std::size_t sample;
     std::int32_t direction;

@@ -43,7 +43,7 @@ class CorrectionLog {
 
   /// The log of a layer that is never corrected.
   CorrectionLog() = default;
-  /// `max_units` is the largest number of units in a correction.
+  /// Makes an empty log, for corrections of up to `max_units` units each.
   CorrectionLog(std::size_t n_inputs, std::size_t max_units)
       : n_inputs_(n_inputs),
         max_units_(max_units),
@@ -105,7 +105,7 @@ namespace detail {
 inline constexpr std::size_t kCacheEntries = 64;
 using Distances = std::array<std::int32_t, kCacheEntries>;
 
-/// Implements add_up_distances, below.
+/// The body of the kernel add_up_distances (see below), compiled for each instruction set.
 SDNN_INLINE void add_up_distances_body(const coding::Bin* cached, std::span<const coding::Bin> bins,
                                        Distances& distances) noexcept {
   Distances sums{};

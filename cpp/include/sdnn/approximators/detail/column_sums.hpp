@@ -239,14 +239,14 @@ template <std::size_t Group>
         for (std::size_t half = 0; half < 2; ++half) {
           __m256i first = group_sum_avx2(block, begin + k, Group, half);
           __m256i second = group_sum_avx2(block, begin + k + Group, Group, half);
-          // Empty statements keep GCC from loading each column twice, ...
+          // An empty statement that claims to change the sums keeps GCC from loading columns twice.
           asm("" : "+x"(first), "+x"(second));
           wide[2 * half] = _mm256_add_epi16(
               wide[2 * half], _mm256_maddubs_epi16(ones, _mm256_unpacklo_epi8(first, second)));
           wide[2 * half + 1] = _mm256_add_epi16(
               wide[2 * half + 1], _mm256_maddubs_epi16(ones, _mm256_unpackhi_epi8(first, second)));
         }
-        // ... and from storing the sums in memory between the steps.
+        // An empty statement that claims to change the sums makes GCC keep them in registers.
         asm("" : "+x"(wide[0]), "+x"(wide[1]), "+x"(wide[2]), "+x"(wide[3]));
       }
     }
@@ -365,7 +365,7 @@ namespace detail {
 using ByteRegister = core::IntegerRegister<std::int8_t>;
 inline constexpr std::size_t kRegistersOfColumn = kBlockUnits / ByteRegister::kSize;
 
-/// Implements add_to_columns, below.
+/// The body of the kernel add_to_columns (see below), compiled for each instruction set.
 SDNN_INLINE void add_to_columns_body(std::int8_t* block, const std::uint32_t* columns,
                                      std::size_t n_columns, const Bytes& change) noexcept {
   for (std::size_t k = 0; k < n_columns; ++k) {
@@ -379,7 +379,7 @@ SDNN_INLINE void add_to_columns_body(std::int8_t* block, const std::uint32_t* co
   }
 }
 
-/// Implements find_largest_bytes, below.
+/// The body of the kernel find_largest_bytes (see below), compiled for each instruction set.
 SDNN_INLINE void find_largest_bytes_body(const std::int8_t* block, std::size_t n_columns,
                                          Bytes& largest) noexcept {
   ByteRegister sizes[kRegistersOfColumn];

@@ -131,7 +131,7 @@ SDNN_INLINE RowUse learn_row_body(std::int32_t* weights, std::int32_t* traces,
                               : learn_columns<true>(weights, traces, signs, n_columns, step);
 }
 
-/// Implements spread_signs, below.
+/// The body of the kernel spread_signs (see below), compiled for each instruction set.
 SDNN_INLINE void spread_signs_body(const std::uint64_t* active, const std::uint64_t* positive,
                                    std::size_t n_words, std::int8_t* signs) noexcept {
   for (std::size_t w = 0; w < n_words; ++w) {
@@ -207,7 +207,7 @@ class LinearWorkspace {
 /// earlier values.
 class LinearTrace {
  public:
-  /// Begins with zeros.
+  /// Makes traces that are all 0.
   LinearTrace(std::size_t n_rows, std::size_t n_columns)
       : n_columns_(n_columns), values_(n_rows * n_columns), live_(n_rows) {}
 

@@ -141,7 +141,7 @@ struct CodeWalk {
 
 namespace detail {
 
-/// Implements list_steps, below.
+/// The body of the kernel list_steps (see below), compiled for each instruction set.
 SDNN_INLINE std::uint8_t* list_steps_body(std::span<const ChunkCode> codes, std::size_t n_words,
                                           std::uint8_t* at, CodeWalk::Step* steps) noexcept {
   ChunkCode last{};
@@ -175,7 +175,7 @@ SDNN_INLINE std::uint8_t* list_steps_body(std::span<const ChunkCode> codes, std:
   return at;
 }
 
-/// Implements sum_steps, below.
+/// The body of the kernel sum_steps (see below), compiled for each instruction set.
 template <class Weight>
 SDNN_INLINE void sum_steps_body(const Weight* rows, std::size_t width, const CodeWalk& walk,
                                 Weight* sums) noexcept {
@@ -218,7 +218,7 @@ struct StepSums {
 
 namespace detail {
 
-/// Implements add_step_sums, below.
+/// The body of the kernel add_step_sums (see below), compiled for each instruction set.
 template <class Weight>
 SDNN_INLINE void add_step_sums_body(std::span<const StepSums<Weight>> walks, std::size_t width,
                                     std::size_t n_samples, std::int32_t* potentials,

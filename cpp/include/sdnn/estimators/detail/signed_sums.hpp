@@ -86,7 +86,7 @@ SDNN_INLINE void add_signed_body(To* to, std::size_t size, const SignedRows<Entr
   }
 }
 
-/// Implements add_row, below.
+/// The body of the kernel add_row (see below), compiled for each instruction set.
 template <class Product>
 SDNN_INLINE void add_row_body(std::int32_t* to, const Product* row, std::int32_t direction,
                               std::size_t size) noexcept {
@@ -97,7 +97,7 @@ SDNN_INLINE void add_row_body(std::int32_t* to, const Product* row, std::int32_t
   }
 }
 
-/// Implements expand_code, below.
+/// The body of the kernel expand_code (see below), compiled for each instruction set.
 SDNN_INLINE void expand_code_body(const coding::TernaryCode& code,
                                   std::span<const std::size_t> words, std::size_t chunk_words,
                                   std::int8_t* entries, std::size_t chunk_stride) noexcept {

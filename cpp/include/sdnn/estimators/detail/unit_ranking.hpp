@@ -16,7 +16,7 @@ namespace detail {
 
 SDNN_WIDE_VECTORS_BEGIN
 
-/// Implements count_firing, below.
+/// The body of the kernel count_firing (see below), compiled for each instruction set.
 SDNN_INLINE std::int32_t count_firing_body(const std::int32_t* potentials,
                                            std::size_t size) noexcept {
   std::int32_t count = 0;
@@ -24,7 +24,7 @@ SDNN_INLINE std::int32_t count_firing_body(const std::int32_t* potentials,
   return count;
 }
 
-/// Implements rank_units, below.
+/// The body of the kernel rank_units (see below), compiled for each instruction set.
 SDNN_INLINE std::int32_t rank_units_body(const std::int32_t* potentials, std::size_t size,
                                          bool firing, int n_bits, std::int32_t limit,
                                          std::int32_t* keys) noexcept {
@@ -66,7 +66,7 @@ SDNN_INLINE std::int32_t rank_units_body(const std::int32_t* potentials, std::si
   return least;
 }
 
-/// Implements least_above, below.
+/// The body of the kernel least_above (see below), compiled for each instruction set.
 SDNN_INLINE std::int32_t least_above_body(const std::int32_t* values, std::size_t size,
                                           std::int32_t floor) noexcept {
   constexpr std::int32_t kNone = std::numeric_limits<std::int32_t>::max();

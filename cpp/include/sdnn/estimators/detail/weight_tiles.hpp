@@ -79,7 +79,7 @@ SDNN_INLINE void add_rows_body(const Weight* tile, std::size_t width, Slots plus
   });
 }
 
-/// Implements add_outer, below.
+/// The body of the kernel add_outer (see below), compiled for each instruction set.
 SDNN_INLINE void add_outer_body(std::int16_t* rows, std::size_t width,
                                 const std::int16_t* coefficients, std::uint64_t active,
                                 std::uint64_t positive) noexcept {
