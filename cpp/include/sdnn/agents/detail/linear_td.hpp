@@ -128,8 +128,8 @@ class LinearTD {
     // A reward of s bits in the unit is below 2^s units. A discounted sum of rewards is at most
     // reward / (1 - gamma), which has `bits_of_sum` more bits.
     const std::int64_t one_minus_gamma = std::max<std::int64_t>(kDiscountOne - usual_discount_, 1);
-    const int bits_of_sum =
-        kDiscountBits + 1 - std::bit_width(static_cast<std::uint64_t>(one_minus_gamma));
+    const auto bits_of_share = std::bit_width(static_cast<std::uint64_t>(one_minus_gamma));
+    const int bits_of_sum = kDiscountBits + 1 - static_cast<int>(bits_of_share);
     const int most_bits = Readout::most_bits_of(n_weights) - bits_of_sum - kImplausibleBits;
     const int n_unused =
         std::min(readout_.spare_bits(), 30 - (size_in_window - exponent)) - kRoomBits;
