@@ -345,7 +345,7 @@ def test_steps_before_a_failure_in_a_vector_are_kept_and_the_training_continues(
     resets_itself, tmp_path
 ):
     envs = gym.vector.SyncVectorEnv([FailsOnce, partial(FailsOnce, "step", 33)])
-    if resets_itself:  # this wrapper resets all environments or none
+    if resets_itself:  # the wrapper cannot reset a single environment: the vector resets itself
         envs = gym.wrappers.vector.NormalizeObservation(envs)
     agent = AGENTS["sdnn"](envs, seed=3)
     path = tmp_path / "checkpoint"
@@ -362,9 +362,11 @@ def test_steps_before_a_failure_in_a_vector_are_kept_and_the_training_continues(
     training.run()
     loaded.run()
     assert training.n_steps == loaded.n_steps == 200
-    # Two whole episodes before the failure, and six after it.
+    # The failure abandons the episodes of both environments, after 12 of their 20 steps. Each had a
+    # whole one before it, and has three in the 68 steps that are left to it.
     assert training.n_episodes == loaded.n_episodes == 8
-    assert states_equal(loaded.agent, agent) != resets_itself, "only one of them is normalized"
+    # The environments of the loaded training have the normalized spaces, but do not normalize.
+    assert states_equal(loaded.agent, agent) != resets_itself
 
 
 def test_resuming_skips_an_episode_whose_reset_failed(tmp_path):

@@ -55,22 +55,26 @@ def test_the_learner_class_of_cpp_learns_over_a_duration(needs, tmp_path):
     (tmp_path / "agent.h").write_text(
         c_header(dutch(), "agent", learning=True, durations=True).text
     )
+    # Both learn that action 0 in x is worth 1. Then action 1 in y leads to x without a reward: its
+    # value is that of x times 0.8 ** 2.5 for `slow`, and times 0.8 for `usual`. A duration below
+    # 0.001 is ignored: were 0.0005 learned, y would be worth nearly as much as x. The agent is
+    # Sarsa, so a step is pending until the next one, or until an episode begins.
     source = """
         #include "agent.h"
-        static agent_learner one, same;
+        static agent_learner slow, usual;
         int main() {
           const int32_t x[AGENT_N_OBSERVED] = {}, far = AGENT_FIXED(0.5);
           const int32_t y[AGENT_N_OBSERVED] = {far, far, far};
-          for (agent_learner* learner : {&one, &same}) {
+          for (agent_learner* learner : {&slow, &usual}) {
             learner->begin_episode();
             learner->learn_over(x, 0, AGENT_FIXED(1.0), y, true, AGENT_DURATION(1.0));
           }
-          one.learn_over(y, 1, 0, x, false, AGENT_DURATION(0.0005));
-          one.learn_over(y, 1, 0, x, false, AGENT_DURATION(2.5));
-          same.learn(y, 1, 0, x, false);
-          one.begin_episode();
-          same.begin_episode();
-          return 0 < one.q(y, 1) && one.q(y, 1) < same.q(y, 1) ? 0 : 1;
+          slow.learn_over(y, 1, 0, x, false, AGENT_DURATION(0.0005));
+          slow.learn_over(y, 1, 0, x, false, AGENT_DURATION(2.5));
+          usual.learn(y, 1, 0, x, false);
+          slow.begin_episode();
+          usual.begin_episode();
+          return 0 < slow.q(y, 1) && slow.q(y, 1) < usual.q(y, 1) ? 0 : 1;
         }
     """
     run(program(tmp_path, f"#include <initializer_list>\n{source}", "g++", *STRICT_CPP))
