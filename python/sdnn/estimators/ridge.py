@@ -132,6 +132,7 @@ def low_rank_diagonal(
         features *= np.sqrt(weights)[:, None]
         gram += features.T @ features
         centered = samples.targets[rows] - samples.mean
+        # Features need no centering here: the weighted sum of the centered targets is 0.
         moments += features.T @ (np.sqrt(weights)[:, None] * centered)
     gram -= np.outer(sums, sums) / total
     values, rotation = eigenvectors(gram)

@@ -160,7 +160,9 @@ def test_the_core_returns_a_time_for_each_repetition():
     assert times.dtype == np.int64
     assert times.size == trial.n_decisions
     network_parts = _core.NetworkParts(trial.agent.networks[0], seed=1)
-    assert (network_parts.time_values(n_repetitions=3) > 0).all()
+    times = network_parts.time_values(n_repetitions=3)
+    assert times.size == 3
+    assert (times > 0).all()
     assert _core.DenseProduct(n_rows=5, n_columns=7, seed=1).run(n_repetitions=0).size == 0
 
 

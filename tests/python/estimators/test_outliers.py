@@ -58,6 +58,8 @@ def fit_and_watch(model, X, y):
 @pytest.mark.parametrize("seed", range(100))
 def test_an_outlier_causes_a_warning_or_a_loss_below_002(seed):
     random = np.random.RandomState(seed)
+    # The same seed makes the same distribution. Half of the test samples are those of training,
+    # which matters little: the losses of two models are compared.
     (X, y), (X_test, y_test) = samples(random), samples(np.random.RandomState(seed), 400)
     make = network if seed % 2 else SDNNKernelRidge
     clean, warned = fit_and_watch(make(), X, y)
@@ -65,6 +67,7 @@ def test_an_outlier_causes_a_warning_or_a_loss_below_002(seed):
     spoiled, warned = fit_and_watch(make(), *with_outlier(random, X, y))
     lost = clean.score(X_test, y_test) - spoiled.score(X_test, y_test)
     assert warned or lost < 0.02
+    # Robust ranges leave another outlier out without a warning.
     robust, warned = fit_and_watch(make(ranges="robust"), *with_outlier(random, X, y))
     assert not warned
     assert clean.score(X_test, y_test) - robust.score(X_test, y_test) < 0.1

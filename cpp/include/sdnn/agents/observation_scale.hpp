@@ -46,9 +46,11 @@ struct ObservedInput {
 
 /// Scales observations to states in [0, 1], with a range for each observed variable.
 ///
-/// With Missing::hold a missing variable gets the middle of its range, and a symbol with a missing
-/// variable becomes the first symbol. With Missing::code an input with n bins has an additional bin
-/// for missing readings, and values are middles of bins; one missing variable makes it missing.
+/// With Missing::hold the caller has already replaced missing readings by the last ones (see
+/// LastReadings). A variable that is still missing has none: it gets the middle of its range, and a
+/// symbol with such a variable becomes the first symbol. With Missing::code an input with n bins
+/// has an additional bin for missing readings, and values are middles of bins; an input is missing
+/// if a variable of it is.
 class ObservationScale {
  public:
   /// Takes the ranges of variables, and the inputs that are made of them. Shapes: low and high

@@ -114,15 +114,17 @@ struct SDNNCConfig {
                         "unit. An assumption."),
             core::field(
                 "weight_limit", &SDNNCConfig::weight_limit,
-                "Largest size, in steps of the lattice, of the sum or difference of two weights "
-                "of a hidden unit: where a correction would exceed it, the unit is not corrected. "
-                "An agent that learns in C needs 127 or less. 0: 16383, beyond which is an error.",
+                "Largest size, in steps of the lattice, of a stored number of a hidden unit, which "
+                "is the sum or the difference of the weights of two units of the code that one "
+                "unit modifies. A unit is not corrected where a number would exceed the limit. An "
+                "agent that learns in C needs 127 or less. 0: 16383, beyond which is an error.",
                 core::within(0, 16383)),
             core::field(
                 "averaging_interval", &SDNNCConfig::averaging_interval,
-                "Corrections between snapshots of the weights, of which the network keeps an "
-                "average for greedy actions, or a 64th part of all if that is more. The latest "
-                "count most; weights take three times the memory. 0, as in the paper: no average.",
+                "Above 0, the network keeps an average of its weights for greedy actions. A "
+                "snapshot enters it after this number of corrections, or after a 64th of all "
+                "corrections so far if that is more. The latest count most; weights take three "
+                "times the memory. 0, as in the paper: no average.",
                 core::within(0, 1000000000)),
             core::field("max_table_bytes", &SDNNCConfig::max_table_bytes,
                         "A larger network (weights, patterns, remembered potentials) is refused "

@@ -25,7 +25,9 @@ TEST(AcrobotDynamicsForms, EnergyAsWorkedByHand) {
   EXPECT_NEAR(dynamics.energy({0.0, core::kPi, 2.0, -1.0}), kinetic + potential, 1e-13);
 }
 
-// The goal is a tip height of 1.5 m.
+// The goal is a tip height of 1.5 m, at speeds below limit_1 and limit_2, which are not reached
+// here. The straight arm is thrown upwards from 0.83 m and passes 1.5 m after 0.28 s. Without a
+// stop it would be at 0.87 m again at the end of the decision, after 1 s.
 TEST(AcrobotDynamicsForms, IntegrationStopsAtTheGoalAndIsMasked) {
   const AcrobotDynamics dynamics;
   const auto reaches_goal = [&](Form::State& state, bool moving) {
