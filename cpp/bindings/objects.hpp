@@ -207,7 +207,7 @@ void wait_while_any(const Condition& is_in_the_way) {
   }
 }
 
-/// Waits until no call in another thread reads the object, so that it can be changed with the GIL
+/// Waits until no call reads the object, so that it can be changed with the GIL
 /// held. Meanwhile calls that begin with wait_for_changes do not begin to read: readers without
 /// pause cannot keep a change from its turn. Use it only for objects that are read for short times.
 template <class Object>
@@ -224,8 +224,8 @@ void wait_for_readers(Object& object) {
 
 /// Waits until other threads' pending and running changes of the objects are done. Every call that
 /// reads, without the GIL, objects of wait_for_readers begins with it, as it may find the objects
-/// changed afterwards. A thread that already reads or waits (it runs a signal handler) does not
-/// wait: the pending change may be waiting for that thread, or be its own.
+/// changed afterwards. A thread that already reads, or waits for readers (it runs a signal
+/// handler), does not wait: the pending change may be waiting for that thread, or be its own.
 template <class... Object>
 void wait_for_changes(const Object&... objects) {
   const auto is_of_this_thread = [](const Use& use) {

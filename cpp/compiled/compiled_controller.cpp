@@ -60,7 +60,8 @@ ControllerConfig preset_of(const AgentSpec& spec) {
   return config;
 }
 
-/// Sets the known bounds of variables in the configuration: those that are finite and differ.
+/// Sets the known bounds of variables in the configuration: the finite ones, which must
+/// differ if ranges are running.
 /// Throws std::invalid_argument for bounds that are not ordered.
 void set_bounds(const Box& box, ObservationConfig& config) {
   core::require_size("observation.high", box.high.size(), box.low.size(),

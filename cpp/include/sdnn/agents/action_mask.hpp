@@ -52,7 +52,8 @@ inline bool is_mask(ActionMask mask) noexcept {
 template <class Draw>
 std::size_t draw_allowed(ActionMask mask, std::size_t n, const Draw& draw) {
   if (mask.empty()) return draw(n);
-  std::size_t n_before = draw(static_cast<std::size_t>(std::ranges::count(mask, 1)));
+  std::size_t n_before = draw(
+      static_cast<std::size_t>(std::ranges::count_if(mask, [](auto entry) { return entry != 0; })));
   std::size_t action = 0;
   while (mask[action] == 0 || n_before-- > 0) ++action;
   return action;

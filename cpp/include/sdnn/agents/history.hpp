@@ -22,7 +22,7 @@ namespace sdnn::agents {
 /// errors by an eighth, which shows noisy sensors. Otherwise differences are added if they explain
 /// 20 % of the changes of an input beyond what the present state explains, and leave less than 30 %
 /// unexplained, which shows velocities that are not observed. Symbols have no history. There is no
-/// automatic history if the experience is too small or there are too many inputs.
+/// automatic history and no observer if the experience is too small or there are too many inputs.
 class HistoryFilter {
  public:
   /// Makes a filter without any history, for observations of `n` inputs.

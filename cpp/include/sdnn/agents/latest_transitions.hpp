@@ -10,7 +10,7 @@
 namespace sdnn::agents {
 
 /// Remembers the last n transitions before transition number 2 n, 4 n, 8 n and so on, where n is
-/// the length of the warm-up, n_steps. Between these times it is empty.
+/// the length of the warm-up, n_steps. It is empty except during these n transitions.
 class LatestTransitions {
  public:
   /// `empty` is a store without transitions. Those of the warm-up, n_steps, count already.

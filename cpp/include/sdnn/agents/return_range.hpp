@@ -17,11 +17,11 @@ namespace sdnn::agents {
 ///
 /// The return of a step is known when its episode terminates, or approximately 2 / (1 - gamma)
 /// steps later, with the missing rest assumed to be like the known part. A time limit does not end
-/// a return: the rewards of the next episode follow. The range is that of 256 returns, spread over
-/// the last half of all, without the lowest twentieth and the highest fiftieth. It has a margin
-/// above for better returns, but none below: untried actions have the lowest value, and should not
-/// look worse than actions that are worse than usual. The range changes when it no longer contains
-/// the returns or is twice as wide as necessary.
+/// a return: the rewards of the next episode follow. The range is that of 256 returns, spread
+/// over the last 40 % of all, without the lowest twentieth and the highest fiftieth. It has a
+/// margin above for better returns, but none below: untried actions have the lowest value, and
+/// should not look worse than actions that are worse than usual. The range changes when it no
+/// longer contains the returns or is twice as wide as necessary.
 ///
 /// Returns are clipped one width beyond the range: otherwise a single huge reward would dominate
 /// the returns of all steps before it.
@@ -129,7 +129,7 @@ class ReturnRange {
   static bool is_sum(double number) noexcept { return number >= -kLargest && number <= kLargest; }
 
   /// The number of returns from one that is remembered to the next: after n returns, n / 512, so
-  /// that the last 256 remembered ones are spread over the last half of all.
+  /// that the last 256 remembered ones are spread over about the last 40 % of all (1 - exp(-1/2)).
   static std::uint64_t returns_between(std::uint64_t n_returns) noexcept {
     return std::max<std::uint64_t>(n_returns / (2 * kMostReturns), 1);
   }

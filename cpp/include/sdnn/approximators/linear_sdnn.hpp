@@ -254,7 +254,7 @@ class LinearSDNN {
   static std::int64_t refined(std::int64_t units, int n) noexcept {
     return std::clamp(units << std::min(n, kWeightBits), 1 - kLargestValue, kLargestValue - 1);
   }
-  /// Returns the largest number of bits of a sum of `n_weights` weights, at most 33.
+  /// Returns a number of bits, at most 33, that sums of `n_weights` weights can have.
   static int most_bits_of(std::int64_t n_weights) noexcept {
     const auto bits = static_cast<int>(std::bit_width(static_cast<std::uint64_t>(n_weights)));
     return std::min(kWeightBits + bits - 1, 33);

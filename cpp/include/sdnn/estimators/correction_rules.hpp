@@ -39,9 +39,8 @@ struct Correction {
 /// Source: Auer, Burgsteiner, Maass 2008; Nonaka, Tanaka, Morita 2011.
 class PDeltaRule {
  public:
-  /// Takes the target numbers of firing units, not rounded: (t - b) / a for an output t = a *
-  /// number
-  /// + b.
+  /// Takes the target numbers of firing units, not rounded: (t - b) / a for an output
+  /// t = a * number + b.
   ///
   /// Shapes: targets (n_samples, n_groups). Throws std::invalid_argument if a target is not finite,
   /// if n_units is 0, if n_groups does not divide it, or if share is not in (0, 1].

@@ -182,10 +182,10 @@ SDNN_KERNEL_OF_REALS(double, product, (const double* a, const double* b, std::si
 
 /// The kernel, of the code of all pairs of inputs, between fixed samples and any queries.
 ///
-/// Let rho_i be the correlation of the patterns of input i in two samples. Then k is the mean of (1
-/// + rho_i) / 2 * rho_j over all i != j, or rho of a single input; the kernel is k, (k + k^2) / 2
-/// or k^3 for the degree 1, 2 or 3. All sums have a fixed order, so that results have the same bits
-/// on every instruction set.
+/// Let rho_i be the correlation of the patterns of input i in two samples. Then k is the mean of
+/// (1 + rho_i) / 2 * rho_j over all i != j, or rho of a single input; the kernel is k, (k + k^2) /
+/// 2 or k^3 for the degree 1, 2 or 3. All sums have a fixed order, so that results have the same
+/// bits on every instruction set.
 ///
 /// Cost: some six operations for each sample and input, several samples at a time in vector
 /// registers. Thread safety: calls may run at the same time.

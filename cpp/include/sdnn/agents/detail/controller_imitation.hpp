@@ -60,8 +60,8 @@ inline std::uint64_t Controller::n_learned() const {
 }
 
 /// Writes the indices of an action into indices_: those of the last exploring act if it took the
-/// same action, because rounding can make several indices the same action. For fuzzy agents, only
-/// checks that it is that action, since they can learn no other.
+/// same action, because rounding can make several indices the same action. Fuzzy
+/// agents can learn no other action: it must be the last one.
 inline void Controller::find_indices(std::span<const double> action, std::size_t environment) {
   actions_.require_action(action);
   if (auto* const fuzzy = std::get_if<FuzzyQLearning>(&*agent_)) {

@@ -117,16 +117,16 @@ class LinearTD {
   /// Makes the unit of values smaller, and thus more precise, by the larger of two numbers of bits:
   /// - those that neither weights nor the rewards of the last window use, minus 8 bits for growth;
   /// - those by which the unit is too large for the recent rewards. It is small enough if values of
-  ///   1,024 times their largest possible discounted sum just fit. Larger weights, which can only
-  ///   be left over from larger rewards, are clipped then.
+  ///   512 to 1,024 times their largest possible discounted sum just fit. Larger weights, which can
+  ///   only be left over from larger rewards, are clipped then.
   ///
   /// The sizes, of the last window and the recent one, are those of RewardScale: powers of 2.
   void refine_unit(std::int32_t size_in_window, std::int32_t size, Episodes<Episode>& episodes) {
     if (!readout_.exponent()) return;
     const std::int32_t exponent = *readout_.exponent();
     const std::int64_t n_weights = readout_.n_weights_of(episodes.of(0).present.code());
-    // A reward of s bits in the unit is below 2^s units. A discounted sum of rewards is at most
-    // reward / (1 - gamma), which has `bits_of_sum` more bits.
+    // With s = size - exponent, a reward is below 2^(s + 1) units. A discounted sum of rewards is
+    // at most reward / (1 - gamma), which has `bits_of_sum` more bits.
     const std::int64_t one_minus_gamma = std::max<std::int64_t>(kDiscountOne - usual_discount_, 1);
     const auto bits_of_share = std::bit_width(static_cast<std::uint64_t>(one_minus_gamma));
     const int bits_of_sum = kDiscountBits + 1 - static_cast<int>(bits_of_share);

@@ -65,8 +65,7 @@ struct AcrobotAngles {
 };
 
 /// The state as four numbers theta1, theta2 (rad), theta1_dot, theta2_dot (rad/s): of a single
-/// acrobot
-/// (`Real` = double), or of several, one in each lane of four registers.
+/// acrobot (`Real` = double), or of several, one in each lane of four registers.
 ///
 /// This is an array and not an Eigen vector, because Eigen does not support lanes as numbers, nor
 /// guarantees that its calls are inlined into a kernel for one instruction set.
