@@ -67,7 +67,7 @@ def power_of_half(x):
 
 
 def log2_of(x):
-    """Return log2(x / 2^30) in units of 2^-20, to 1e-4; x is at least 1.
+    """Return log2(x / 2^30) in units of 2^-20, to 1.2e-4; x is at least 1.
 
     The coefficients are those of a polynomial for log2(1 + f), f in [0, 1), exact at both ends.
     """

@@ -161,6 +161,7 @@ UNFIT_WORKERS = {
         sys.meta_path.insert(0, Blocker())
     """,
 }
+"""Notes about workers, and the code that makes a worker unfit so."""
 
 
 def test_workers_with_other_code_get_no_trials(cluster, tmp_path):
@@ -176,9 +177,6 @@ def test_workers_with_other_code_get_no_trials(cluster, tmp_path):
     assert outcome.n_run == 12
     assert not outcome.failures
     assert digest == run(tmp_path / "here", make_plan(6))[1]
-
-
-"""Notes about workers, and the code that makes a worker unfit so."""
 
 
 KILLED_BY_SEED = """

@@ -160,12 +160,16 @@ def test_an_online_layer_learns_while_two_threads_read_without_pause():
     is_over = threading.Event()
 
     def read():
+        """Read until the learner is done; return how often it succeeded."""
+        n_reads = 0
         while not is_over.is_set():
             try:
                 layer.potentials(BINS_OF_60_SAMPLES)
+                n_reads += 1
             except RuntimeError as error:  # called while the layer was being changed
                 if IN_USE not in str(error):
                     raise
+        return n_reads
 
     def learn():
         for _ in range(30):
@@ -178,7 +182,7 @@ def test_an_online_layer_learns_while_two_threads_read_without_pause():
         wait([learner], timeout=60)
         is_over.set()
     assert learner.result(), "the learner was done only after the readers"
-    assert [reader.result() for reader in readers] == [None, None]
+    assert all(reader.result() > 0 for reader in readers)
 
 
 def test_a_signal_ends_a_wait_for_readers_and_its_handler_may_read(begin_in_thread):

@@ -10,8 +10,6 @@ from refusals import refuses
 from sdnn import SDNNClassifier, SDNNRegressor
 from sdnn.coding import RandomInverse, Symbolic, WithMissing
 
-pytestmark = pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
-
 RANDOM = np.random.RandomState(0)
 X = RANDOM.uniform(0, 1, (200, 4))
 Y = np.sin(5 * X[:, 0]) * X[:, 1]
@@ -19,6 +17,12 @@ LABELS = np.digitize(Y, [-0.3, 0.3])
 ROWS = [dict(zip("abcd", row, strict=True)) for row in X.tolist()]
 UNIT = RandomInverse(low=0.0, high=1.0)
 OPTIONS = {"n_pattern_units": 40, "random_state": 1}
+
+
+def assert_equal_weights(model, expected):
+    np.testing.assert_array_equal(model.weights_, expected.weights_)
+    np.testing.assert_array_equal(model.thresholds_, expected.thresholds_)
+    assert model.n_iter_ == expected.n_iter_
 
 
 def test_estimators_learn_numbers_and_labels(river):
@@ -49,6 +53,7 @@ def test_estimators_have_default_models_and_refuse_others(river):
             make(wrong)
 
 
+@pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
 def test_features_may_be_named_by_numbers(river):
     model = river.RiverRegressor(SDNNRegressor(**OPTIONS), grace_period=20)
     for x, y in zip(X[:40], Y[:40], strict=True):
@@ -67,6 +72,7 @@ def river_models(river, **options):
     ]
 
 
+@pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
 @pytest.mark.parametrize("n_before", [0, 19, 40])  # the grace period ends with 20 samples
 @pytest.mark.parametrize("number", [0, 1], ids=["regressor", "classifier"])
 def test_estimators_refuse_a_bad_sample_and_keep_learning(river, number, n_before):
@@ -82,7 +88,7 @@ def test_estimators_refuse_a_bad_sample_and_keep_learning(river, number, n_befor
     for row, target in zip(ROWS[n_before:60], targets[n_before:], strict=False):
         model.learn_one(row, target)
         without_refusals.learn_one(row, target)
-    np.testing.assert_array_equal(model.fitted.weights_, without_refusals.fitted.weights_)
+    assert_equal_weights(model.fitted, without_refusals.fitted)
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -104,6 +110,7 @@ def late_stream(n_samples):
         yield x, a + x.get("late", 0.0) + 2 * (x["word"] == "w")
 
 
+@pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
 @pytest.mark.parametrize("n_pattern_units", [40, None, 2000])  # 2000: too large to be extended
 def test_features_and_categories_may_appear_late(river, n_pattern_units):
     ordered, reordered = (river_models(river)[0] for _ in range(2))
@@ -141,7 +148,7 @@ def test_adding_inputs_keeps_predictions_and_can_be_saved(river, tmp_path):
     model.fitted.learn_one({"new": 0.5, "word": "w"}, 0.5)
     model.fitted.save(tmp_path / "grown.safetensors")
     loaded = SDNNRegressor.load(tmp_path / "grown.safetensors")
-    np.testing.assert_array_equal(loaded.weights_, model.fitted.weights_)
+    assert_equal_weights(loaded, model.fitted)
 
 
 def test_before_fitting_the_first_of_equally_frequent_labels_is_predicted(river):
@@ -151,6 +158,7 @@ def test_before_fitting_the_first_of_equally_frequent_labels_is_predicted(river)
     assert model.predict_one(ROWS[0]) == "red", "each of three labels came twice, red first"
 
 
+@pytest.mark.filterwarnings("ignore::sdnn.estimators.OutOfRangeWarning")
 def test_follows_ranges_halves_the_error_on_drifting_features(river):
     random = np.random.RandomState(0)
     errors = {}

@@ -68,6 +68,8 @@ def test_an_image_of_a_linear_agent_with_impossible_numbers_is_refused():
     agent, same = discrete(), discrete()
     for trained in (agent, same):
         run_agent(trained, lines_of(agent, 300, 1, 16), 16)
+        trained.act([0.1, 0.2, 0.3])  # a refusal does not end the running episode either
+        trained.learn(Transition([0.1, 0.2, 0.3], 0, 1.0, [0.2, 0.2, 0.3], False))
     image, fields = save_image(agent), fields_of(agent)
     for name in ("action_value.n_snapshots", "n_ended", "n_learned", "action_value.n_steps"):
         n_bytes = fields[name].stop - fields[name].start

@@ -103,10 +103,9 @@ CASES = {
     ", vector": {"action_space": TORQUES},
     ", warm-up": {"observation_space": UNBOUNDED, "warm_up_steps": 30},
 }
+"""Arguments of agents beside the usual ones, by the end of the name of an agent."""
 AGENT_CASES = [agent_class.__name__ + case for agent_class in SETTINGS for case in CASES]
 """Names of agents of all classes and cases, such as "SDNNQLambda, vector"."""
-
-"""Arguments of agents beside the usual ones, by the end of the name of an agent."""
 
 HERE = [0.1, 0.2]
 """A good observation."""

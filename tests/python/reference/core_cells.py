@@ -203,8 +203,6 @@ METHODS = {
         "n_repetitions": 2, "n_selections": 3, "n_selected": 2
     },
 }  # fmt: skip
-
-
 """Good arguments of methods, by the names of class and method."""
 
 
