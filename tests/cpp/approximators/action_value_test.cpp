@@ -59,7 +59,8 @@ SDNNCConfig small_network() {
 }
 
 // Checks that values and value agree, that reading them changes nothing, and that corrections move
-// the value to the target of 3.
+// the value to the target of 3. The 100 active units of the SDNN-C stand for values in steps of
+// 40 / 88 = 0.45; at a rate of 1/2, errors of less than a step are lost by rounding.
 template <ActionValue Q>
 void expect_pure_reads_and_reached_targets(Q model) {
   testing::WithWorkspace<Q> q(std::move(model));
@@ -127,6 +128,8 @@ TEST(ActionValue, WorkspacesFollowTheUpdatesOfAModel) {
   expect_workspaces_follow_updates(RBFNetwork({.n_inputs = 2, .n_actions = 5}));
 }
 
+// An assertion, which only debug builds have, keeps the network from reading the 308 potentials of
+// the other network's workspace as its own 300.
 #ifndef NDEBUG
 TEST(ActionValueDeathTest, AWorkspaceOfAnotherSizeIsRefused) {
   SDNNCConfig config = small_network();

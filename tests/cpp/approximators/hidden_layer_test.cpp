@@ -89,9 +89,10 @@ TEST(HiddenLayer, PotentialsEqualPlainSumsOnRandomProblems) {
     }
     EXPECT_EQ(potentials(layer, few), expected);
   }
-  EXPECT_GT(n_high_bytes, 1000U);
+  EXPECT_GT(n_high_bytes, 1000U);  // weights of two bytes were among the problems
 }
 
+// Weights beyond [-127, 127] have a second byte: two have one at +-500, and none again at 0.
 TEST(HiddenLayer, AWeightBeyondAByteHasAHighByte) {
   HiddenLayer layer(3, 2);
   const Input x{.plus = {0}, .minus = {1}};
@@ -228,7 +229,8 @@ TEST(HiddenLayer, AddingToAColumnEqualsSettingItsWeights) {
   EXPECT_THROW(added.add_to_column(0, changes, 1), std::invalid_argument);
 }
 
-// Sizes are units, columns, and columns in which corrections count twice.
+// Sizes are units, columns, and columns in which corrections count twice. Weights are 16383 in size
+// at most, thresholds less than 2^30.
 TEST(HiddenLayer, RefusesBadSizesAndWeights) {
   EXPECT_THROW(HiddenLayer(0, 1), std::invalid_argument);
   EXPECT_THROW(HiddenLayer(1, 0), std::invalid_argument);

@@ -96,6 +96,8 @@ TEST(LinearSDNN, InputsAddedOneByOneAreWiredLikeInputsAddedAtOnce) {
   EXPECT_TRUE(std::ranges::equal(five.weights(), at_once.weights()));
 }
 
+// The default number falls with the number of pairs, 300 * 299 for 300 inputs, so that without its
+// lower limit it would be 0. For more inputs, that number does not fit in an int.
 TEST(LinearSDNN, HasAtLeast64PatternUnitsWithManyInputs) {
   for (const int n_inputs : {300, 50'000, std::numeric_limits<int>::max()}) {
     EXPECT_EQ(with_pattern_units({.n_inputs = n_inputs}).n_pattern_units, 64) << n_inputs;

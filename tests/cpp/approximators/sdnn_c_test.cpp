@@ -17,6 +17,8 @@
 namespace sdnn::approximators::small_sdnn_c {
 namespace {
 
+// Thresholds are -200 and 200 in turns, beyond the sums of the small initial weights. So every
+// other unit fires, 150 in each window of 300, which is the middle of the range from -20 to 20.
 TEST(SDNNC, QIsExactlyZeroEverywhereAtTheStart) {
   for (const int n_inputs : {4, 6}) {
     Network network({.n_inputs = n_inputs}, 7);
@@ -83,6 +85,8 @@ TEST(SDNNC, RoundingDecidesOnFractionsOfAUnit) {
 }
 
 // Weights of two bytes have separate storage and sums, which must not allocate on first use either.
+// On a lattice of 64 a correction changes weights by 64 steps, so that two can reach 128, beyond a
+// byte.
 TEST(SDNNC, LearningLargeWeightsAllocatesNothing) {
   SDNNCConfig config = small_config();
   config.lattice = 64;
@@ -235,7 +239,8 @@ TEST(SDNNC, RefusesAStateThatDoesNotFit) {
   testing::expect_damaged_states_refused(network);
   const core::State good = core::state_of(network);
   EXPECT_EQ(good.at("weights").shape, (std::vector<std::size_t>{12, 2 * 8}));  // units, columns
-  // Weights beyond their limit of 16383, thresholds of 2^30 in size, an empty or infinite range.
+  // Weights beyond their limit of 16383, thresholds of 2^30 in size, and a low end of the range
+  // that is not finite, not below the high end of 20, or so large that values would not be finite.
   const auto refused = [&](const core::State& bad, const std::string& message) {
     testing::expect_refused(network, bad, "state: " + message);
   };

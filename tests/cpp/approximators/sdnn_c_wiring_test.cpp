@@ -74,6 +74,9 @@ void expect_error_of(const SDNNCConfig& config, const std::string& name) {
   EXPECT_EQ(error_of(config).rfind(name + " must be ", 0), 0U) << error_of(config);
 }
 
+// 16 inputs have 16 * 15 * 4096 = 983040 columns. Each needs 2 bytes for 900 weights and 4 of a
+// permutation: 1773404160 bytes. Patterns take 16 * 360 * 512 * 16 = 47185920 bytes, remembered
+// potentials 844800. Messages begin with the settings behind the largest of the three parts.
 TEST(SDNNC, TooLargeANetworkIsRefusedBeforeMemoryIsAllocated) {
   const auto refusal = [](const SDNNCConfig& config) {
     return testing::message_of<std::length_error>([&] { Network(config, 1); });
@@ -101,6 +104,8 @@ TEST(SDNNC, TooLargeANetworkIsRefusedBeforeMemoryIsAllocated) {
   EXPECT_NE(refusal(smaller), "no error");
 }
 
+// By default there are 4 inputs, 900 hidden units, windows of 300 of them for 601 actions, values
+// from -20 to 20 for 20 to 280 firing units, and a lattice of whole numbers.
 TEST(SDNNC, NamesTheFieldThatDoesNotFitTheOthers) {
   EXPECT_EQ(error_of({.n_hidden_units = 900, .n_active_units = 901}),
             "n_active_units must be in [1, 900], got 901");

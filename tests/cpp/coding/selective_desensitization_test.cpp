@@ -98,6 +98,8 @@ TEST(SelectiveDesensitization, RefusesTablesOfDifferentSizes) {
                        std::vector<coding::InputPair> pairs) {
     return SelectiveDesensitization(std::move(modified), std::move(modifiers), std::move(pairs));
   };
+  // No pairs, two modifiers for a pair, a table for two pairs, patterns of different lengths, and
+  // an input of one bin by one table and of two bins by the other.
   const auto two = table({1, -1}, 1);
   const auto three = table({1, -1, 1}, 1);
   EXPECT_THROW(make({}, {}, {}), std::invalid_argument);

@@ -50,7 +50,8 @@ Reals matrix_of(const KernelSums& kernel, const Bins& bins) {
   return matrix;
 }
 
-// The last two arguments of a kernel are its number of terms and its degree.
+// The last two arguments of a kernel are its number of terms, here that of inputs, and its degree:
+// a kernel k of degree 1 becomes (k + k^2) / 2 for degree 2, and k^3 for degree 3.
 TEST(KernelSums, IsTheMeanOverPairsByHand) {
   const std::vector inputs{powers_of(0.5, 4), InputCorrelations{{1.0, 0.25, 0.25, 1.0}, 2}};
   // The query (2, 1) correlates with the sample (0, 0) by 1/4 and 1/4, with (3, 1) by 1/2 and 1.
@@ -80,6 +81,8 @@ TEST(KernelSums, ABinOfCorrelationZeroIsUnlikeAll) {
   // correlates them with nothing, the second with one another.
   const std::vector inputs{InputCorrelations{{1.0, 0.5, 0.0}, 3},
                            InputCorrelations{{0.0, 0.0, 0.0, 1.0}, 2}};
+  // With a single term the kernel is the sum of both correlations: 0.5 + 0 for bins (1, 0) and
+  // (0, 0), 0 + 1 for (2, 1) and itself.
   const KernelSums kernel(inputs, Bins{0, 0, 2, 1}, 1, 1);
   EXPECT_EQ(matrix_of(kernel, {1, 0, 2, 1}), (Reals{0.5, 0.0, 0.0, 1.0}));
 }

@@ -30,8 +30,8 @@ KernelWindow window_of(std::size_t capacity) {
 double input_of(int i) { return std::fmod(0.618 * i, 1.0); }
 
 TEST(KernelWindow, IsKernelRidgeRegression) {
-  // The range of the input is 2, so a length scale of 0.5 ranges is 1. The ridge of 0.25 makes the
-  // diagonal of the matrix 1.25.
+  // The kernel is exp(-|difference of inputs| / length scale). The range of the input is 2, so a
+  // length scale of 0.5 ranges is 1. The ridge of 0.25 makes the diagonal of the matrix 1.25.
   KernelWindow window(Numbers{0.0}, Numbers{2.0}, 1, 10, 0.5, 0.25);
   EXPECT_EQ(predicted(window, {1.0}), 0.0);
   window.learn(Numbers{0.0}, Numbers{3.0});
@@ -81,7 +81,8 @@ TEST(KernelWindow, AddedInputsAndOutputsAreLearned) {
   EXPECT_NEAR(out[0], 0.0, 1e-12);
 }
 
-// Targets larger than 20 times their mean size are clipped.
+// Targets larger than 20 times their mean size, here 1, are clipped. Unlimited, the outlier of 1e9
+// would raise the prediction at its input to 2.6e8.
 TEST(KernelWindow, LimitedTargetsReduceTheEffectOfAnOutlier) {
   KernelWindow window(Numbers{0.0}, Numbers{1.0}, 1, 50, 1.0, 0.1, /*target_limit=*/20.0);
   for (int i = 0; i < 40; ++i) window.learn(Numbers{input_of(i)}, Numbers{i % 2 ? 1.0 : -1.0});

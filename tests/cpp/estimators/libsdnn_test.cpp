@@ -35,8 +35,10 @@ TEST(Libsdnn, RefusesBadArguments) {
   EXPECT_EQ(estimators::standard_library_named("libstdc++"), StandardLibrary::libstdcxx);
   EXPECT_THROW(estimators::standard_library_named("libc++"), std::invalid_argument);
   LibsdnnRandom random(kSeed, StandardLibrary::msvc);
+  // The numbers of units, of bins, and of units of each sign that flip from bin to bin.
   EXPECT_THROW(estimators::libsdnn_patterns({71, 3, 1}, random), std::invalid_argument);   // odd
   EXPECT_THROW(estimators::libsdnn_patterns({70, 3, 35}, random), std::invalid_argument);  // all
+  // Weights from 5 to -5, and a pair of inputs 0 and 1 where there is one input only.
   EXPECT_THROW(estimators::libsdnn_weights(2, 3, 5, -5, random), std::invalid_argument);
   const std::vector<coding::RandomInverseConfig> inputs(1, {10, 3, 1});
   const std::vector<coding::InputPair> pairs{{0, 1}};

@@ -142,6 +142,7 @@ TEST(OnlineLayer, RefusesWeightsBeyond14BitsAndBadArguments) {
   OnlineLayer online(testing::layer_for(problem));
   PDeltaRule rule = rule_for(problem);
   const std::size_t n_inputs = problem.code->n_inputs();
+  // The rule has targets of all samples, the bins are those of a single one.
   EXPECT_THROW(online.present(std::span(problem.bins).first(n_inputs), rule),
                std::invalid_argument);
   PDeltaRule rule_of_more_units(2 * problem.n_units, problem.targets, problem.n_groups);
@@ -163,7 +164,7 @@ TEST(Interruption, EndsTrainingInEveryFormAndPrediction) {
   std::vector<std::int32_t> counts(problem.bins.size() / problem.code->n_inputs());
   const testing::StopAt stopping(0);
   EXPECT_THROW(testing::trainer_for(problem, layer, TrainingForm::dual), testing::StopError);
-  testing::n_points_left = 0;
+  testing::n_points_left = 0;  // to be stopped again, at the next point
   EXPECT_THROW(layer->counts(problem.bins, 1, 1, counts), testing::StopError);
 }
 

@@ -49,7 +49,9 @@ TEST(ProbabilityMixture, WeightsAreTheLikelihoodsOfSharesAndThreeSteepnesses) {
   EXPECT_NEAR(mixed(mixture, {0.5, 0.5}, {0.1, 0.6})[1], expected, 1e-15);
 }
 
-// Each of two scorers is always sure of one class; weight 0 is that of the shares.
+// Each of two scorers is always sure of one class; weight 0 is that of the shares. Without the
+// discount of earlier labels, 500 of class 0 would outweigh the later 300 of class 1. No weight
+// reaches 1, because every expert keeps 0.001.
 TEST(ProbabilityMixture, WeightsFollowADriftThatChangesTheBetterExpert) {
   ProbabilityMixture mixture(2);
   const Numbers shares{0.5, 0.5}, scores{1.0, 0.0, 0.0, 1.0};

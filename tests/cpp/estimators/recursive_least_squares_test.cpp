@@ -43,8 +43,8 @@ TEST(RecursiveLeastSquares, FollowsAChangeSoonerTheMoreItForgets) {
     const double input = i % 2 == 0 ? 0.5 : -0.5, slope = i < 150 ? 1.0 : -1.0;
     for (auto* model : {&slow, &fast}) model->learn(Numbers{input}, Numbers{slope * input});
   }
-  EXPECT_NEAR(predicted(fast, {0.4}), -0.4, 0.01);
-  EXPECT_GT(predicted(slow, {0.4}), 0.1);
+  EXPECT_NEAR(predicted(fast, {0.4}), -0.4, 0.01);  // the last 50 slopes outweigh all others
+  EXPECT_GT(predicted(slow, {0.4}), 0.1);           // about 0.2: the mean slope is (150 - 50) / 200
 }
 
 // Input 0 is in [10, 20]; input 1 is always 5 and does not count.
@@ -90,7 +90,9 @@ TEST(RecursiveLeastSquares, PredictsAFifthBeyondTheRangeOfTargetsAtMost) {
   EXPECT_NEAR(predicted(model, {2.9}), 1.2, 1e-12);  // targets reached from 0 to 1
 }
 
-// Without inputs the prediction is a mean of the targets 1 and -1, and then of 1e9.
+// Without inputs the prediction is a mean of the targets 1 and -1, and then of 1e9. Errors are
+// about 1, so that the limited error of the last target is about 20, of which the mean takes a
+// hundredth.
 TEST(RecursiveLeastSquares, LimitedErrorsReduceTheEffectOfAnOutlier) {
   RecursiveLeastSquares limited(Numbers{}, Numbers{}, 1, 1.0, /*error_limit=*/20.0),
       unlimited(Numbers{}, Numbers{}, 1, 1.0);

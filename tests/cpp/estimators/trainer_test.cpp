@@ -25,13 +25,15 @@ TEST(Trainer, CorrectionsStopBeforeAPotentialOverflows) {
     auto layer = std::make_shared<estimators::ParallelPerceptron>(problem.code, problem.n_units,
                                                                   weights, thresholds);
     EXPECT_THROW(testing::trainer_for(problem, layer, form), std::overflow_error);
-    thresholds[0] = INT32_MAX - 3 * reach;  // room for three
+    // With room for three, the trainer computes the room anew after every three presentations. Unit
+    // 0 is silent and never corrected, so that there is always room for three more.
+    thresholds[0] = INT32_MAX - 3 * reach;
     layer = std::make_shared<estimators::ParallelPerceptron>(problem.code, problem.n_units, weights,
                                                              thresholds);
     auto trainer = testing::trainer_for(problem, layer, form);
     for (const auto& order : problem.orders) trainer.present(order);
     trainer.synchronize();
-    EXPECT_LE(layer->check_norms(), INT32_MAX);
+    EXPECT_LE(layer->check_norms(), INT32_MAX);  // a bound of all potentials
   }
 }
 

@@ -20,7 +20,8 @@ HighBytes listed(const HighByteLists& lists, std::size_t block) {
   return high_bytes;
 }
 
-// A list has the high bytes that are not 0, by column and unit. All changes are in block 1.
+// A list has the high bytes that are not 0, by column and unit. All changes are in block 1, whose 3
+// columns of 4 units never exceed the capacity of 12.
 TEST(HighByteLists, HoldRandomChangesOfABlock) {
   HighByteLists lists(/*n_blocks=*/2, /*capacity=*/12);
   HighBytes expected;

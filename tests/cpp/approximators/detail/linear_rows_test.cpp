@@ -141,6 +141,7 @@ TEST(LinearRows, ACorrectionIsSubtractedTimesTheCodeOnEveryInstructionSet) {
   });
 }
 
+// Traces decay by nine tenths, towards 0; rounded to the nearest, 4 * 0.9 would remain 4 for ever.
 TEST(LinearRows, TracesDecayToZeroAndStayWithinTheirLimit) {
   std::vector<std::int32_t> weights{0, 0}, traces{kLargestTrace, -kLargestTrace};
   const std::vector<std::int8_t> signs{1, -1};

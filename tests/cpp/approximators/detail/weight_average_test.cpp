@@ -60,7 +60,9 @@ TEST(WeightAverage, AveragesWeightsOfAnySize) {
   }
 }
 
-// A weight that alternates between 100 and -100, 700 corrections each: its average is near 0.
+// A weight alternates between 100 and -100, 700 corrections each. Its average is over about an
+// eighth of all corrections, 2500, which leaves 100 * tanh(700 / (2 * 2500)) = 14 of the
+// oscillation.
 TEST(WeightAverage, AnOscillatingWeightAveragesToItsMiddle) {
   HiddenLayer layer(1, 1);
   WeightAverage average(layer, 10);
