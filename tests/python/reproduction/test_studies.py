@@ -163,6 +163,8 @@ def test_differences_of_returns_are_formatted_with_their_signs():
 
 
 def test_differences_of_fewer_than_six_trials_are_not_called_different(study):
+    # Differences of equal variants all have one sign with probability 2 * 0.5**n: 6 % of 5 trials,
+    # more than the 5 % outside an interval, but 3 % of 6.
     for n_trials, differs in ((5, False), (6, True)):
         mine = study(TWO, n_trials=n_trials)
         records = [

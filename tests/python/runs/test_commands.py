@@ -243,6 +243,7 @@ def test_errors_of_export_name_option_or_file_and_write_nothing(refused, tmp_pat
     space = gym.spaces.Box(-1.0, 1.0, (2,))
     SDNNQLearning(space, space).save("sdnn.safetensors")
     RBFQLearning(space, gym.spaces.Box(-1.0, 1.0, (1,))).save("rbf.safetensors")
+    # Without bounds of observations, their ranges are unknown until the end of a warm-up.
     SDNNQLearning(gym.spaces.Box(-np.inf, np.inf, (2,)), space).save("unsettled.safetensors")
     Path("damaged").write_text("no agent")
     Path("folder").mkdir()
@@ -287,6 +288,7 @@ def test_plot_draws_goals_random_actions_and_baselines(output_of, refused, tmp_p
         return [row["kind"] for row in rows if not row["step"]]
 
     assert levels() == ["goal", "random actions"]
+    # With --plain, without the lines of the goal and of random actions.
     assert levels("--plain", "--baseline", "PPO", "--baseline", "RBFN") == ["PPO", "RBFN"]
     message = refused("plot", "pole", "--baseline", "nobody", code=2)
     assert "--baseline: " in message
@@ -721,6 +723,8 @@ def test_train_reports_values_in_steps_that_are_too_coarse(output_of):
 
 
 def test_train_reports_observations_that_are_left_out(output_of):
+    # The agent chooses its inputs when its warm-up of 1,000 steps ends. Observed are a position and
+    # a speed, and four random numbers.
     task = "drifting_env:tests/Crowded-v0"
     options = ["--agent", "q-lambda", "--steps", 1001, "--evaluate-every", 0]
     printed = output_of("train", task, *options, "--out", "one", "--json")

@@ -229,6 +229,7 @@ def test_notes_name_runs_and_evaluations_that_are_omitted(tmp_path):
     assert {c.run for c in curves if c.kind == "return"} == {
         str(run.folder) for run in (whole, short, begun)
     }
+    # `whole` is evaluated at steps 20, 40 and 60, `short` at 20 and 40; medians are of both.
     (curve,) = (curve for curve in curves if curve.kind == "evaluation")
     assert (curve.n_runs, curve.kind, curve.values.tolist()) == (2, "evaluation", [1, 3])
     names = [begun.folder, empty.folder, f"{whole.folder}, {short.folder}"]

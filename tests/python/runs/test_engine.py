@@ -43,7 +43,8 @@ def test_teams_have_one_agent_each_and_shrink_as_jobs_increase():
     n_of_agent = 4 * 3  # trials: three in each of four cases
     teams = teams_of(plan, 2)
     assert {planned for team in teams for planned in team} == set(plan)
-    # Each trial of sdnn-c runs alone; those of fuzzy and of rbf are divided over two jobs.
+    # Each trial of sdnn-c runs alone, as it would not be faster in a team; those of fuzzy and of
+    # rbf are divided over two jobs.
     assert sorted(map(len, teams)) == [1] * n_of_agent + [n_of_agent // 2] * 2 * 2
     assert all(len({planned.key.agent for planned in team}) == 1 for team in teams)
     assert max(map(len, teams_of(plan, 1))) == MOST_TOGETHER
@@ -85,7 +86,7 @@ def test_a_trial_that_fails_in_a_team_does_not_affect_the_others(tmp_path, monke
     acrobot = kwargs["acrobot"] | {"goal_reward": 1e39, "penalty": 1e39}  # over a float's range
     environment = spec.environment.replace(kwargs=kwargs | {"acrobot": acrobot})
     bad = PlannedTrial(plan[0].key, spec.replace(environment=environment))
-    good = plan[3]
+    good = plan[3]  # of the same agent, fuzzy, in the next case
     monkeypatch.setattr("sdnn.runs.engine.teams_of", lambda planned, jobs: [planned])  # one team
     with ResultStore(tmp_path) as store:
         outcome = run_trials([bad, good], store, executor=ThreadExecutor(1))

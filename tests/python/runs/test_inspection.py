@@ -135,7 +135,7 @@ def test_wrong_options_are_named(invoke, refused, trained):
 
 
 def test_an_agent_that_is_warming_up_is_refused(trained):
-    folder = trained("CartPole-v1", steps=200)
+    folder = trained("CartPole-v1", steps=200)  # of the 1,000 of its warm-up
     with pytest.raises(RunError, match="warming up"):
         inspect_run(Run.open(folder))
 
@@ -162,6 +162,7 @@ def test_warnings_name_narrow_use_collapse_and_rounded_rewards(trained):
     ]
     collapsed = replace(inspection, rows=evaluations)
     assert any("--keep-best" in text for text in collapsed.warnings())
+    # A reward of 1 is two units of values, where fewer than 1,000 are warned of.
     coarse = {**inspection.report, "value_unit": 0.5, "recent_reward": 1.0}
     rounded = replace(inspection, report=coarse)
     assert any("rounded" in text for text in rounded.warnings())

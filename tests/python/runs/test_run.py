@@ -308,7 +308,7 @@ def test_missing_and_damaged_files_of_a_run_are_refused_by_name(whole, tmp_path)
     run.train(steps=100)
     path = run.folder / "results.sqlite"
     kept = path.read_bytes()
-    with ResultStore(run.folder) as store:
+    with ResultStore(run.folder) as store:  # which keeps only two of the rows
         store.extend(run.key, TrialRows.from_training([]), 2, config="{}", version="0.1")
     refuses("results.sqlite", run.train, steps=200, error=RunError)
     path.write_bytes(b"cake\n" + kept)
@@ -331,7 +331,7 @@ def test_missing_and_damaged_files_of_a_run_are_refused_by_name(whole, tmp_path)
 
 
 def test_rows_are_readable_before_the_first_checkpoint(tmp_path, whole, monkeypatch):
-    monkeypatch.setattr("sdnn.runs.run.STORE_SECONDS", -1.0)
+    monkeypatch.setattr("sdnn.runs.run.STORE_SECONDS", -1.0)  # to store each row at once
     run = Run.create(tmp_path / "run", CONFIG)
     rows_before = []
 

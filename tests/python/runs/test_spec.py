@@ -95,6 +95,7 @@ def test_the_hash_ignores_seed_and_output_but_no_other_settings():
     assert spec.replace(output=OutputSpec(tensorboard=True)).config_hash == spec.config_hash
     assert FULL.config_hash != spec.config_hash
     robust = paper_spec(agent="sdnn-c-robust")
+    # The settings in which the preset "robust" differs from the paper's.
     same_settings = paper_spec(approximator={"n_actions": 61}, learning={"n_steps": 5})
     assert robust.config_hash == same_settings.config_hash
     assert paper_spec(learning={"discount": 1}) == paper_spec(learning={"discount": 1.0})

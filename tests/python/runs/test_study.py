@@ -349,6 +349,8 @@ def test_check_raises_errors_of_the_core_with_file_and_line(study, tmp_path, tex
 
 
 def test_check_skips_trials_that_are_stored(study, monkeypatch):
+    # The step is no whole fraction of the second between decisions. Two trials are planned, and an
+    # error is raised unless both are stored.
     impossible = "environment.kwargs.acrobot.integration_step = 0.3\n"
     loaded = study("[cases.s4]\n[variants.a]\n" + impossible, n_trials=2)
     loaded.check(stored=loaded.keys("s4", "a"))

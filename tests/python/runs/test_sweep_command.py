@@ -252,4 +252,5 @@ gym.register("mine/Line-v0", entry_point=Line, max_episode_steps=30)
     line = sys.modules["my_line_world"].Line
     # Two variants: each is tried once, in two environments, and then its two trials are run.
     assert (line.n_made, line.n_open) == (2 * (2 + 2 * 2), 0)
+    # Random actions reach the goal, with the reward of 1, in 13 % of the episodes.
     assert results[0]["measures"]["mean_return"]["median"]["value"] > 0.2

@@ -153,7 +153,7 @@ def test_a_changed_setting_gives_other_rows(tmp_path, real_records):
 
 def test_a_setting_that_does_not_fit_its_hash_is_found(tmp_path, real_records):
     folder = stored(tmp_path / "out", real_records)
-    change = "UPDATE runs SET config = replace(config, '0.9', '0.8') WHERE id = 2"
+    change = "UPDATE runs SET config = replace(config, '0.9', '0.8') WHERE id = 2"  # the discount
     execute(folder / "results.sqlite", change)
     error = refuses("runs", verify_folder, folder, error=StoreError)
     assert "id 2" in str(error)
