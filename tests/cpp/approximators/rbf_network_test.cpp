@@ -162,6 +162,7 @@ TEST(RBFNetwork, RefusesBadArgumentsAndChangesNothing) {
   EXPECT_THROW(network.update(good, 0, 1.0, 0.0), std::invalid_argument);
   EXPECT_THROW(network.update(good, 0, 1.0, 1.5), std::invalid_argument);
   EXPECT_THROW(network.update(good, 0, 1.0, std::nan("")), std::invalid_argument);
+  // The step towards an infinite target is beyond the limit of 1e305.
   EXPECT_THROW(network.update(good, 0, testing::kInfinity), std::overflow_error);
   EXPECT_TRUE(std::ranges::equal(network.weights(), weights));
 }

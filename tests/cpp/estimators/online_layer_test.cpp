@@ -99,7 +99,7 @@ TEST(OnlineLayer, AStoppedPresentationChangesNothing) {
       layer->potentials(stream.bins, 1, expected);
       ASSERT_EQ(potentials, expected);
     }
-    EXPECT_NO_THROW(OnlineLayer{layer});
+    EXPECT_NO_THROW(OnlineLayer{layer});  // another copy of the weights changes nothing either
     online.synchronize();
     ASSERT_EQ(testing::parameters_of(*layer), before);
   }

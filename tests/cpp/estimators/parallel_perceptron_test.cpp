@@ -67,6 +67,9 @@ std::shared_ptr<const ParallelPerceptron::Code> code_of_three(std::size_t n_unit
   return std::make_shared<coding::SelectiveDesensitization>(modified, modifiers, pairs);
 }
 
+// Many queries are answered together, by sums over pairs of inputs or by a walk through the
+// queries, and with copies of the weights in 16 bits where that is enough; a single query adds its
+// weights.
 TEST(ParallelPerceptron, BlocksOfQueriesHaveThePotentialsOfSingleOnes) {
   constexpr std::size_t kQueries = 2500, kUnits = 100;
   for (const std::size_t n_units : {42U, 130U}) {

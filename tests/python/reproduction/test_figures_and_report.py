@@ -269,6 +269,7 @@ def test_the_report_names_measures_that_need_longer_trials(tmp_path, run, collec
     report = Report(experiments=((experiment, results),), costs=(), quick=True, seed=0)
     page = report.page({"experiment-b": PICTURES["experiment-a"]})
     by_number = {row[0]: row[-1] for row in next(page.tables).rows}
+    # A collapse ends a run of 50 evaluations, of which trials of 100 episodes have 10.
     assert by_number["6"] == "episode of collapse, difference: too short to tell"
     assert any("needs more episodes" in note for note in page.notes)
 

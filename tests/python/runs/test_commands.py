@@ -717,7 +717,7 @@ def test_train_reports_values_in_steps_that_are_too_coarse(output_of):
     ends = ["approximator.q_low=-1e6", "approximator.q_high=1e6"]
     options = [word for point in ["learning.value_range=fixed", *ends] for word in ("--set", point)]
     lines = output_of("train", *task, *options, "--out", "wide")
-    # A range of 2e6 over counts of firing units from 40 to 560: 2e6 / 520 = 3.85e3.
+    # By default an action has 600 units, of which 40 to 560 fire: 2e6 / 520 = 3.85e3.
     assert re.search(r"values come in steps of 3\.85e\+03, .*approximator\.q_low", lines)
     assert "values come in steps" not in output_of("train", *task, "--out", "adaptive")
 

@@ -92,6 +92,7 @@ TEST(CodeWalk, SumsOfStepsEqualSumsOfCodes) {
   expect_exact_walk_sums<std::int32_t>(1000000);
 }
 
+// A walk starts anew at a code that differs from the one before by more than its active columns.
 TEST(CodeWalk, StartsDistantCodesFromZero) {
   core::Random random(9, core::Stream::weights);
   const CodeWalk walk =
