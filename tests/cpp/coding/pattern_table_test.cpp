@@ -52,8 +52,8 @@ TEST(PatternTable, BinsAreHalfOpenAndTheLastOneIsClosed) {
 
 TEST(PatternTable, RefusesSignsOfWrongSizeOrValue) {
   const std::array<std::int8_t, 2> signs{1, 0};
-  EXPECT_THROW(PatternTable::from_signs(signs, 1, 2), std::invalid_argument);
-  EXPECT_THROW(PatternTable::from_signs(signs, 1, 3), std::invalid_argument);
+  EXPECT_THROW(PatternTable::from_signs(signs, 1, 2), std::invalid_argument);  // 0 is no sign
+  EXPECT_THROW(PatternTable::from_signs(signs, 1, 3), std::invalid_argument);  // needs 3 signs
   EXPECT_THROW(PatternTable(0, 2), std::invalid_argument);
   EXPECT_THROW(PatternTable(2, 0), std::invalid_argument);
 }

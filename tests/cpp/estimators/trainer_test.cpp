@@ -44,11 +44,13 @@ TEST(Trainer, RefusesBadArgumentsAndDoesNotChangeTheLayer) {
   auto trainer = testing::trainer_for(problem, layer, TrainingForm::automatic);
   EXPECT_NE(trainer.form(), TrainingForm::automatic);
   EXPECT_THROW(trainer.present(std::vector<std::int32_t>{0, -1}), std::invalid_argument);
+  // Random problems have 150 samples at most.
   EXPECT_THROW(trainer.present(std::vector<std::int32_t>{0, 1000}), std::invalid_argument);
   EXPECT_EQ(trainer.present({}).n_samples, 0U);
   trainer.synchronize();
   EXPECT_EQ(testing::parameters_of(*layer), before);
-  EXPECT_THROW(testing::trainer_for(problem, layer, TrainingForm::plain, 0), std::invalid_argument);
+  EXPECT_THROW(testing::trainer_for(problem, layer, TrainingForm::plain, /*n_threads=*/0),
+               std::invalid_argument);
   auto fewer = problem;
   fewer.targets.resize(fewer.targets.size() - fewer.n_groups);
   EXPECT_THROW(testing::trainer_for(fewer, layer, TrainingForm::plain), std::invalid_argument);

@@ -72,7 +72,7 @@ def test_panels_show_medians_and_quartiles_of_the_stored_rows(results):
 
 
 def test_short_trials_are_drawn_without_smoothing(tmp_path, run, collected):
-    run(tmp_path, fake_trial.make_plan(2, 300))
+    run(tmp_path, fake_trial.make_plan(2, 300))  # episodes; curves are smoothed from 2,000 on
     results = collected(EXPERIMENT, tmp_path, 2, 300)
     for axes, result in zip(draw_experiment(EXPERIMENT, results).axes, results, strict=True):
         ((_, line),) = curves_of(axes)

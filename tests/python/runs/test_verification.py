@@ -333,7 +333,7 @@ def test_files_of_a_folder_are_refused_with_its_name(tmp_path, refused, real_rec
 
 
 def test_trials_of_too_many_decisions_are_not_run(tmp_path, real_records):
-    record = replace(real_records[0], n_decisions=10**12)
+    record = replace(real_records[0], n_decisions=10**12)  # trials of up to 10**9 are run
     difference = only_difference(verify_folder(stored(tmp_path / "out", [record])))
     assert "budget.episodes" in difference.problem
     assert not difference.was_run
