@@ -86,7 +86,7 @@ def test_a_trial_that_fails_in_a_team_does_not_affect_the_others(tmp_path, monke
     acrobot = kwargs["acrobot"] | {"goal_reward": 1e39, "penalty": 1e39}  # over a float's range
     environment = spec.environment.replace(kwargs=kwargs | {"acrobot": acrobot})
     bad = PlannedTrial(plan[0].key, spec.replace(environment=environment))
-    good = plan[3]  # of the same agent, fuzzy, in the next case
+    good = plan[3]  # fuzzy again, in the next case
     monkeypatch.setattr("sdnn.runs.engine.teams_of", lambda planned, jobs: [planned])  # one team
     with ResultStore(tmp_path) as store:
         outcome = run_trials([bad, good], store, executor=ThreadExecutor(1))

@@ -135,7 +135,7 @@ def test_wrong_options_are_named(invoke, refused, trained):
 
 
 def test_an_agent_that_is_warming_up_is_refused(trained):
-    folder = trained("CartPole-v1", steps=200)  # of the 1,000 of its warm-up
+    folder = trained("CartPole-v1", steps=200)  # fewer than the 1,000 of its warm-up
     with pytest.raises(RunError, match="warming up"):
         inspect_run(Run.open(folder))
 
