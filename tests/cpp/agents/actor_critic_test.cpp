@@ -72,6 +72,7 @@ TEST(ActorCritic, ForbiddenActionsAreNeitherTakenNorLearned) {
   EXPECT_EQ(p[0], p[1]);  // one allowed action has a gradient of 0
 }
 
+// Scales are powers of two, by which products are exact: even the last bits must be equal.
 TEST(ActorCritic, ProbabilitiesDoNotDependOnTheScaleOfRewards) {
   std::vector<double> p;
   for (const double scale : {1.0, 0x1p40, 0x1p-40}) {

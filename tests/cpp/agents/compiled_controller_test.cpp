@@ -80,7 +80,8 @@ std::string error_of_setting(const std::string& name, const SettingValue& value)
   return error_with([&](AgentSpec& spec) { spec.settings[name] = value; });
 }
 
-// A compiled agent of the default preset with four settings equals a controller made of them.
+// A compiled agent of the default preset with four settings equals a controller made of them. The
+// preset is made for 4 inputs, a number that the controller replaces by that of the observation.
 TEST(CompiledController, MakesLearnsAndWritesTheBitsOfTheController) {
   const testing::Folder folder;
   const auto preset = general_q_lambda_preset(4);

@@ -25,6 +25,7 @@ std::size_t best_by(TieRule rule, const Row& values) {
   return EpsilonGreedy({.tie_rule = rule}, 1).select(values, 0);
 }
 
+// Eight values are compared at a time, then a rest of up to seven, so sizes have every remainder.
 TEST(BestValue, IsTheLargestAtAnyIndex) {
   for (std::size_t size = 1; size < 70; ++size) {
     for (std::size_t at = 0; at < size; ++at) {

@@ -22,6 +22,7 @@ TEST(SquareRoot, IsRoundedDownToAnInteger) {
 }
 
 // normalized(error, exponent) takes errors in units of 2^exponent, of the standard deviation 2^-2.
+// It divides them by the root mean square of the errors so far, which the first 2,000 make precise.
 TEST(ErrorScale, NormalizesErrorsToARootMeanSquareOfOne) {
   core::Random random(1, core::Stream::weights);
   ErrorScale scale;
@@ -35,6 +36,7 @@ TEST(ErrorScale, NormalizesErrorsToARootMeanSquareOfOne) {
   EXPECT_NEAR(sum / 2000, 1.0, 0.1);
 }
 
+// An error is divided by the root mean square of all errors so far, itself included.
 TEST(ErrorScale, NormalizesTheFirstErrorToPlusOrMinusOne) {
   for (const std::int64_t error : {std::int64_t{1} << 28, -(std::int64_t{1} << 20)}) {
     ErrorScale scale;
@@ -53,6 +55,7 @@ TEST(ErrorScale, DoesNotDependOnTheUnit) {
   }
 }
 
+// The outlier determines the mean square of 101 errors: it would be sqrt(101) = 10 without a limit.
 TEST(ErrorScale, ClipsAnOutlierToThreeAndKeepsZero) {
   ErrorScale scale;
   for (int i = 0; i < 100; ++i) scale.normalized(1 << 20, 0);

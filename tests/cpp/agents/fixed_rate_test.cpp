@@ -81,6 +81,7 @@ TEST(FixedRate, SleepingLongerThanAPeriodIsAMiss) {
 }
 
 // At random rates and with work of random length, a tick begins in its own period, and only once.
+// Work begins up to 0.3 periods late and takes up to 2, so it ends up to 1.3 periods too late.
 TEST(FixedRate, EveryTickBeginsWithinItsPeriod) {
   core::Random random(2, core::Stream::weights);
   for (int run = 0; run < 200; ++run) {
@@ -119,6 +120,7 @@ TEST(FixedRate, TenPeriodsOf200HzTakeAtLeast49Ms) {
   EXPECT_GE(Clock::now() - before, std::chrono::milliseconds(49));
 }
 
+// Rates may be from 0.001 to 1,000,000 Hz.
 TEST(FixedRate, RefusesRatesOutOfRange) {
   for (const double bad : {0.0, -1.0, 1e-4, 2e6, testing::kNaN, testing::kInfinity}) {
     EXPECT_THROW(FixedRate{bad}, std::invalid_argument);

@@ -263,6 +263,7 @@ TEST(FuzzyQLearning, RefusesInconsistentStates) {
   bad = good;
   bad["traced"] = testing::tensor_of<std::int64_t>({0, 0});
   refused(bad, "traced must be two per eligibility");
+  // Traces that decay by 0.9 * 0.8 a step are forgotten long before there are 100,000 of them.
   bad["traced"] = testing::tensor_of(std::vector<std::int64_t>(200000, 0));
   bad["eligibilities"] = testing::tensor_of(std::vector<double>(100000, 1.0));
   refused(bad, "eligibilities must be not too many");

@@ -130,6 +130,7 @@ TEST(History, AveragesMoveByAHalfAndAFifthOfTheDistance) {
 TEST(History, SteadyGainsSolveTheRiccatiEquation) {
   // For a constant number with noise of variance r, the predicted variance p r solves
   // p = p - p^2 / (p + 1) + drift, hence p^2 - drift p - drift = 0. The gain is p / (p + 1).
+  // Arguments are the linear model of the next state, the noise of each sensor, and the drift.
   const double drift = 0.3, p = (drift + std::sqrt(drift * drift + 4.0 * drift)) / 2.0;
   EXPECT_NEAR(detail::steady_gains({1.0}, {2.0}, drift)[0], p / (p + 1.0), 1e-12);
   // For two variables, SciPy's solve_discrete_are gave the numbers.
@@ -295,7 +296,8 @@ TEST(History, AStepAllocatesNothing) {
   }
 }
 
-// Its approximator needs two inputs; without a history the single one would be repeated.
+// Its approximator needs two inputs; without a history the single one would be repeated, as it is
+// with an observer, which adds none. Differences add one input, averages two.
 TEST(History, ASingleInputIsNotRepeatedBesideInputsOfAHistory) {
   for (const auto& [history, n_inputs] :
        {std::pair{History::differences, 2U}, {History::averages, 3U}, {History::observer, 2U}}) {
@@ -326,7 +328,8 @@ ControllerConfig grid_config(History history) {
   return config;
 }
 
-// A grid of 8^2 fuzzy rules fits into its memory limit, one of 8^4 with differences does not.
+// A grid of 8^2 fuzzy rules with 3 values of 4 bytes needs 768 of at most 16,384 bytes, one of 8^4
+// rules, with the differences of both inputs, 49,152.
 TEST(History, DifferencesThatMakeAGridTooLargeAreRefusedAndNotSelectedAutomatically) {
   EXPECT_THROW(Controller(grid_config(History::differences)), std::length_error);
   ControllerConfig config = grid_config(History::automatic);

@@ -141,6 +141,7 @@ ControllerConfig config_of(AnyApproximatorConfig approximator, AnyLearningConfig
 }
 
 // A teacher's transitions may end a warm-up early, which finds the range of the second variable.
+// Afterwards imitate is refused with an observation of one variable, and a return beyond 1e300.
 TEST(Imitation, RefusesToEndAWarmUpWithoutTransitionsOrTwice) {
   const LinearSDNNConfig small{.n_pattern_units = 20, .averaging_interval = 0};
   Controller agent(config_of(small, QLambdaConfig{}));

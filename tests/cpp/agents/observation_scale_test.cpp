@@ -89,10 +89,11 @@ TEST(ObservationScale, MissingReadingsAreRefusedHeldOrCoded) {
   const ObservationScale refusing = scale(Missing::error);
   const Numbers missing{testing::kInfinity, testing::kNaN};
   EXPECT_THROW(scaled(refusing, missing), std::invalid_argument);
-  EXPECT_EQ(scaled(scale(Missing::hold), missing), (Numbers{0.5, 0.5}));
+  EXPECT_EQ(scaled(scale(Missing::hold), missing), (Numbers{0.5, 0.5}));  // before a reading
   // Middles of bins: the last of 4 and of 8; for -0.9 and 1 the first and the last but one.
   EXPECT_EQ(scaled(scale(Missing::code), missing), (Numbers{3.5 / 4.0, 7.5 / 8.0}));
   EXPECT_EQ(scaled(scale(Missing::code), {1.0, -0.9}), (Numbers{0.5 / 4.0, 6.5 / 8.0}));
+  // States have no -0.0, which has other bits than 0.0.
   EXPECT_FALSE(std::signbit(scaled(refusing, {-0.0, 0.0})[1]));
   const ObservationScale angles = scale_of_angles();
   for (const double bad : {testing::kNaN, testing::kInfinity}) {

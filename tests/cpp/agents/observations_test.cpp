@@ -47,7 +47,8 @@ std::string error_of(const ObservationConfig& config) {
 }
 
 TEST(Observations, AreFittedWithAQuarterOfTheirWidthMoreAtEachEnd) {
-  // Two observations of three variables: 0 and 4, -5 and 5, and a constant of 7.
+  // Two observations of three variables: 0 and 4, -5 and 5, and a constant of 7, whose size counts
+  // as its width.
   const auto observations = fitted(unbounded(3), {0.0, -5.0, 7.0, 4.0, 5.0, 7.0});
   EXPECT_EQ(low_of(observations), (Numbers{-1.0, -7.5, 7.0 - 7.0 / 4}));
   EXPECT_EQ(high_of(observations), (Numbers{5.0, 7.5, 7.0 + 7.0 / 4}));

@@ -104,6 +104,7 @@ TEST(QLambda, TracesDecayByTheDurationOfTheTransitionBefore) {
   }
 }
 
+// After t steps rates have gone t / (t + schedule_steps) of the way to their final values.
 TEST(QLambda, RatesAreHalfwayAfterScheduleSteps) {
   QLambda agent = agent_of({.learning_rate = 1.0,
                             .policy = {.epsilon = 0.5, .n_greedy_steps = 0},
@@ -243,7 +244,10 @@ TEST(QLambda, EveryEndOfAnEpisodeHalvesTheLongestRandomActionDownToFiveSteps) {
 }
 
 // In long episodes some explorations are excursions: several steps of actions with the lowest
-// value, so that an agent that would stay in good states learns about others.
+// value, so that an agent that would stay in good states learns about others. With epsilon 1 these
+// are one exploration in four: 1 to 5 steps, since ends of episodes have shortened the 20, and 3 on
+// average. Random actions last 1 + 1/2 + ... + 1/5 = 2.3 steps on average, so the share of
+// excursions is 3 / (3 + 3 * 2.3), about 600 of 2,000 steps.
 TEST(QLambda, StepsOfExcursionsAreTheWorstOnesAndAreLearnedOnlyIfTheyTerminate) {
   QLambda agent = agent_of({.max_action_repeat = 20}, /*n_actions=*/{5}, /*window=*/2);
   learn_at_random(agent, 100, 2);
@@ -280,7 +284,8 @@ TEST(QLambda, RefusesStatesWithAnImpossibleNumberOfEndedEpisodes) {
   }
 }
 
-// Ten rewards of 0, then one of 1: twenty more steps are random, each action for 1 to 5 of them.
+// Ten rewards of 0, then one of 1: twenty more steps are random. In such a search each action lasts
+// for 1 to max_action_repeat / 2 = 5 of them; of 200^2 actions, new ones are hardly ever equal.
 TEST(QLambda, SearchesTwiceAsLongAfterTheFirstRewardAsBeforeIt) {
   const State state{0.5, 0.5};
   QLambda agent = agent_of({.max_action_repeat = 10}, {200, 200});
@@ -298,6 +303,7 @@ TEST(QLambda, SearchesTwiceAsLongAfterTheFirstRewardAsBeforeIt) {
   EXPECT_FALSE(core::state_of(agent).contains("n_random_left"));
 }
 
+// In a joint trace the reward of 1 would raise Q(a, 0) to 0.73, about gamma lambda = 0.99 * 0.8.
 TEST(QLambda, EnvironmentsHaveSeparateTraces) {
   QLambda together = agent_of({});
   together.set_n_environments(2);

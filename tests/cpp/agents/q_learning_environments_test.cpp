@@ -91,7 +91,8 @@ TEST(QLearning, RefusesInconsistentStatesOfEnvironments) {
   constexpr std::int64_t kNoAction = 7;  // the last action is 6
   refused(testing::with_number(good, "environment.2.kept_action", kNoAction),
           "kept_action must be an action");
-  core::State bad = good;  // a second one is missing
+  // Without environment 1 the environments end at 0, and the first tensor of 2 is one too many.
+  core::State bad = good;
   std::erase_if(bad, [](const auto& item) { return item.first.starts_with("environment.1."); });
   testing::expect_refused(agent, bad, "state: environment.2.kept_action must not be there");
 }

@@ -17,7 +17,7 @@ TEST(RangeNotes, StateTheSharesOfRangesThatAreUsedAndOfValuesBeyondThem) {
   RangeNotes notes(4);
   for (int t = 0; t < 4000; ++t) {
     notes.note(Numbers{20.0 + t / 100.0, t % 4 == 0 ? 3.0 : 0.0, 1.0 * t, 0.5});
-    if (t == 80) {  // too few notes
+    if (t == 80) {  // about 10 notes, and 20 are needed
       EXPECT_FALSE(notes.use(observations)[0]);
     }
   }
@@ -32,6 +32,8 @@ TEST(RangeNotes, StateTheSharesOfRangesThatAreUsedAndOfValuesBeyondThem) {
   EXPECT_EQ(use[0]->share_beyond, 0.0);
 }
 
+// The gaps between notes are random. Each eighth observation would be in the same one, two or three
+// phases of the periods 8, 16 and 24, whose values use at most 0.7 of the range.
 TEST(RangeNotes, SampleAllPhasesOfRegularEpisodes) {
   const Observations observations({.low = {0.0}, .high = {1.0}}, false, 1);
   for (const int period : {3, 4, 5, 8, 16, 24}) {

@@ -33,7 +33,8 @@ void expect_range(const ReturnRange& range, double low, double high) {
   EXPECT_EQ(range.high(), high);
 }
 
-// gamma = 15/16: every number is exact. `note` returns whether the range has moved.
+// gamma = 15/16: every number is exact. `note` returns whether the range has moved. At first it has
+// to contain the sums of past rewards: each reward plus gamma times the sum before, as in 5 + 15.
 TEST(ReturnRange, GrowsAtFirstByAQuarterMoreThanNeeded) {
   RewardStream environment(0.9375);  // no returns before 64 steps
   EXPECT_FALSE(environment.range.is_known());
@@ -71,8 +72,9 @@ TEST(ReturnRange, OfNegativeRewardsEndsAtZero) {
   expect_range(environment.range, -5.0, 0.0);
 }
 
-// Episodes of one step: returns are rewards, from -20 to 79. Without the lowest five and the
-// highest two they are -15 to 77, a width of 92; above there is room for a quarter of it.
+// Episodes of one step: returns are rewards, from -20 to 79. The lowest twentieth and the highest
+// fiftieth count as rare; without these five and two the returns are -15 to 77, a width of 92.
+// Above there is room for a quarter of it.
 TEST(ReturnRange, ContainsAllButTheRarestReturns) {
   RewardStream environment(0.5);
   for (int i = 1; i <= 100; ++i) environment.note(i - 21.0, true);

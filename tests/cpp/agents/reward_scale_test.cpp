@@ -25,7 +25,7 @@ TEST(RewardScale, RefusesAnOutlierUntilItRecursSevenTimes) {
   EXPECT_TRUE(scale.accepts(-0x1p40));
   EXPECT_EQ(scale.size(), 40);
   EXPECT_EQ(scale.refused()->first, -0x1p40);
-  EXPECT_EQ(scale.refused()->second, 4U);
+  EXPECT_EQ(scale.refused()->second, 4U);  // the fourth reward, after 0, 1 and -1.5
   EXPECT_TRUE(RewardScale().accepts(0x1p1000));
 }
 

@@ -17,7 +17,7 @@ TEST(RunningRanges, AreTwoAndAHalfDeviationsAroundTheMean) {
   RunningRanges ranges(2);
   EXPECT_EQ(ranges[0], std::pair(-2.5, 2.5));  // mean 0 and deviation 1 before the first value
   for (const double x : {1.0, 3.0, 5.0}) ranges.note(std::vector{x, 7.0});
-  EXPECT_EQ(ranges[0], std::pair(3.0 - 2.5 * 2.0, 3.0 + 2.5 * 2.0));  // mean 3, deviation 2
+  EXPECT_EQ(ranges[0], std::pair(3.0 - 2.5 * 2.0, 3.0 + 2.5 * 2.0));  // deviation sqrt(8 / 2)
   const auto [low, high] = ranges[1];                                 // a constant
   EXPECT_LT(low, 7.0);
   EXPECT_GT(high, 7.0);

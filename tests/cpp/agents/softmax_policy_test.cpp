@@ -113,7 +113,8 @@ TEST(SoftmaxPolicy, TheMeanOfAnActionAndItsNeighboursIsWeightedByProbabilities) 
   EXPECT_EQ(policy.mean_offset(workspace, 1, 0), 65535.0 / 3 / 65536.0);
 }
 
-// Preferences that `learn` keeps equal those of a copy that has to compute them.
+// Preferences that `learn` keeps equal those of a copy that has to compute them. Rate and weight of
+// the entropy are 0.1 and 0.01 in units of 2^-16, the decay is 0.99 * 0.9 in units of 2^-13.
 TEST(SoftmaxPolicy, PreferencesAreThoseOfTheWeightsAfterEveryStep) {
   const std::size_t only[] = {1};
   const approximators::LinearSDNN net({.n_inputs = 2, .n_pattern_units = 64}, only, 1);

@@ -135,7 +135,7 @@ TEST(State, OmitsMissingOptionalMembersAndRestoresNumberedParts) {
   EXPECT_EQ(restored.limit, std::nullopt);
   EXPECT_TRUE(restored.others.empty());
   State bad = state;
-  bad.erase("other.4.value");
+  bad.erase("other.4.value");  // three parts are left: the next name in order is other.10's
   testing::expect_refused(restored, bad, "state: other.10.value must not be there");
 }
 

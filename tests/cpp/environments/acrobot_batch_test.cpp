@@ -157,6 +157,7 @@ TEST(AcrobotBatch, RefusesBadArgumentsBeforeAnyAcrobotMoves) {
   step = Step(3);
   step.truncated.push_back(0);
   EXPECT_EQ(message(step), "truncated must be of 3 items, got 4");
+  // Only the step without an error has moved acrobots, and acrobot 2 rested in it.
   EXPECT_EQ(batch.decisions(0), 1);
   EXPECT_EQ(batch.decisions(2), 0);
   EXPECT_THROW(batch.set_state(0, {kNaN, 0.0, 0.0, 0.0}), std::invalid_argument);

@@ -24,7 +24,8 @@ TEST(AlignedBuffer, IsZeroedAlignedAndCopiedByValue) {
 }
 
 TEST(AlignedBuffer, RefusesSizesThatOverflow) {
-  EXPECT_THROW(AlignedBuffer<std::int32_t>(SIZE_MAX / 4), std::bad_alloc);  // numbers have 4 bytes
+  // Numbers of 4 bytes: SIZE_MAX - 3 bytes are too many with the cache line for their alignment.
+  EXPECT_THROW(AlignedBuffer<std::int32_t>(SIZE_MAX / 4), std::bad_alloc);
   EXPECT_EQ(checked_product(SIZE_MAX / 3, 3), SIZE_MAX);
   EXPECT_THROW(checked_product(SIZE_MAX / 3 + 1, 3), std::bad_alloc);
   EXPECT_EQ(checked_product(0, SIZE_MAX), 0U);
