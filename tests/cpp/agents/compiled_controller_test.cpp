@@ -138,7 +138,7 @@ TEST(CompiledController, AReadAgentOfEveryTypeContinuesLikeTheWrittenOneAndAnAge
     EXPECT_EQ(testing::content_of(folder / "agent"), testing::content_of(folder / "read_agent"));
     EXPECT_EQ(testing::content_of(folder / "agent"), testing::content_of(folder / "file"));
     const std::array<double, 2> observation = {0.5, 3.0};
-    read_agent.begin_greedy_episode();
+    read_agent.begin_greedy_episode();  // changes nothing, as no greedy episode is under way
     EXPECT_TRUE(
         std::ranges::equal(read_agent.act(observation, false), agent.act(observation, false)));
   }

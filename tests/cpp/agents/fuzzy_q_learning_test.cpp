@@ -159,6 +159,7 @@ Fuzzy agent_with_traces() {
           3};
 }
 
+// Values are floats, which a reward of 1e300 would make infinite.
 TEST(FuzzyQLearning, ARefusedRewardDoesNotChangeTraces) {
   Fuzzy agent = agent_with_traces(), without_refusals = agent_with_traces();
   const State state = {0.3, 0.6}, next = {0.3, 0.7};

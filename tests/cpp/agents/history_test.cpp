@@ -160,7 +160,7 @@ TEST(History, AnObserverReducesTheErrorOfNoisySensors) {
       error_of_sensors += (sensed[i] - exact[i]) * (sensed[i] - exact[i]);
     }
   }
-  EXPECT_LT(error_of_estimates, 0.6 * error_of_sensors);
+  EXPECT_LT(error_of_estimates, 0.6 * error_of_sensors);  // 0.37 here, 1 without a filter
 }
 
 /// An agent that pushes the mass; each action lasts a step.

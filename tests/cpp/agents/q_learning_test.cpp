@@ -212,9 +212,8 @@ TEST(QLearning, WithoutRepeatedActionsTheirRandomStreamIsNotUsed) {
   EXPECT_NE(after.at("policy.exploration.words"), before.at("policy.exploration.words"));
 }
 
-// gamma = 1/2. The range is a quarter wider than that of known returns: first 8 * 5/4 = 10. Until
-// 32 returns are known, sums of past rewards stand for them: a reward plus gamma times the last
-// sum.
+// gamma = 1/2. The range is a quarter wider than that of known returns: first 8 * 5/4 = 10. Before
+// 32 are known, sums of past rewards stand for them: a reward plus gamma times the last sum.
 TEST(QLearning, AnAdaptiveRangeOfValuesFollowsTheRewards) {
   OneDimension<QLearning<SDNNC>> agent(SDNNC(small_network(), 1),
                                        {.discount = 0.5, .value_range = ValueRange::adaptive}, 1);

@@ -94,6 +94,7 @@ TEST(AcrobotBatch, HasTheBitsOfSingleAcrobotsOnEveryInstructionSet) {
   });
 }
 
+// In 200 steps nine tenths of 37 acrobots make 6,660 decisions, at most 7 in an episode.
 TEST(AcrobotBatch, HasTheBitsOfSingleAcrobotsWithOtherConfigurations) {
   AcrobotConfig config;
   config.goal_test = GoalTest::decision_instant;

@@ -10,7 +10,8 @@
 namespace sdnn::tools {
 namespace {
 
-// The product is of floats, so it differs from that of doubles by rounding.
+// The product is of floats, so it differs from that of doubles by rounding. Four rows and eight
+// columns are multiplied at a time, so sizes are below, at and above multiples of these.
 TEST(DenseProduct, EqualsThePlainProductAtAnySize) {
   for (const auto& [n_rows, n_columns] : std::vector<std::pair<std::size_t, std::size_t>>{
            {1, 1}, {3, 7}, {8, 16}, {9, 33}, {90, 240}, {16, 8}}) {
