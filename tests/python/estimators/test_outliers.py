@@ -58,7 +58,7 @@ def fit_and_watch(model, X, y):
 @pytest.mark.parametrize("seed", range(100))
 def test_an_outlier_causes_a_warning_or_a_loss_below_002(seed):
     random = np.random.RandomState(seed)
-    # The same seed makes the same distribution. Half of the test samples are those of training,
+    # Equal seeds make equal distributions. Half of the test samples are those of training,
     # which matters little: the losses of two models are compared.
     (X, y), (X_test, y_test) = samples(random), samples(np.random.RandomState(seed), 400)
     make = network if seed % 2 else SDNNKernelRidge
