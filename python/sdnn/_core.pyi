@@ -94,9 +94,9 @@ class SDNNCConfig:
     rounding : {'half_up', 'random', 'away'}
         Of the number of units that are to fire. `half_up`: to the nearest; `random`: up or down at random in proportion, so that no small change is lost on average; `away`: in the direction of the change by at least one unit. An assumption.
     weight_limit : int
-        Largest size, in steps of the lattice, of the sum or difference of two weights of a hidden unit: where a correction would exceed it, the unit is not corrected. An agent that learns in C needs 127 or less. 0: 16383, beyond which is an error. Must be in [0, 16383].
+        Largest size, in steps of the lattice, of a stored number of a hidden unit, which is the sum or the difference of the weights of two units of the code that one unit modifies. A unit is not corrected where a number would exceed the limit. An agent that learns in C needs 127 or less. 0: 16383, beyond which is an error. Must be in [0, 16383].
     averaging_interval : int
-        Corrections between snapshots of the weights, of which the network keeps an average for greedy actions, or a 64th part of all if that is more. The latest count most; weights take three times the memory. 0, as in the paper: no average. Must be in [0, 1000000000].
+        Above 0, the network keeps an average of its weights for greedy actions. A snapshot enters it after this number of corrections, or after a 64th of all corrections so far if that is more. The latest count most; weights take three times the memory. 0, as in the paper: no average. Must be in [0, 1000000000].
     max_table_bytes : int
         A larger network (weights, patterns, remembered potentials) is refused before memory is allocated; 1 GiB by default. For all action dimensions together, where an agent has several.
     
@@ -126,7 +126,7 @@ class SDNNCConfig:
     @property
     def averaging_interval(self) -> int:
         """
-        Corrections between snapshots of the weights, of which the network keeps an average for greedy actions, or a 64th part of all if that is more. The latest count most; weights take three times the memory. 0, as in the paper: no average.
+        Above 0, the network keeps an average of its weights for greedy actions. A snapshot enters it after this number of corrections, or after a 64th of all corrections so far if that is more. The latest count most; weights take three times the memory. 0, as in the paper: no average.
         """
     @property
     def balanced_anchors(self) -> bool:
@@ -251,7 +251,7 @@ class SDNNCConfig:
     @property
     def weight_limit(self) -> int:
         """
-        Largest size, in steps of the lattice, of the sum or difference of two weights of a hidden unit: where a correction would exceed it, the unit is not corrected. An agent that learns in C needs 127 or less. 0: 16383, beyond which is an error.
+        Largest size, in steps of the lattice, of a stored number of a hidden unit, which is the sum or the difference of the weights of two units of the code that one unit modifies. A unit is not corrected where a number would exceed the limit. An agent that learns in C needs 127 or less. 0: 16383, beyond which is an error.
         """
 class SDNNC:
     """
