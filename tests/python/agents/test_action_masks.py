@@ -105,6 +105,7 @@ def test_masked_vectors_learn_alike_in_all_modes_and_one_environment_as_a_single
 
 @pytest.mark.parametrize("mode", ["NEXT_STEP", "SAME_STEP"])
 def test_masked_vectors_that_reset_themselves_take_allowed_actions(mode, monkeypatch):
+    # Without this, the training would reset each environment of a SyncVectorEnv itself.
     monkeypatch.setattr("sdnn.training.vectors._resets_each", lambda env: False)
     env = gym.vector.SyncVectorEnv([new_env] * 3, autoreset_mode=gym.vector.AutoresetMode[mode])
     agent = new_agent(SDNNQLambda, env)

@@ -205,13 +205,14 @@ def test_rows_of_json_without_next_observations_follow_each_other(tmp_path):
 
 def test_a_log_that_does_not_end_the_warm_up_is_warned_of():
     agent = new_agent(observation_range="adaptive", warm_up_steps=100)
-    with pytest.warns(UserWarning, match="60"):  # the log has 40 transitions
+    with pytest.warns(UserWarning, match="60"):  # the log has 40 of the 100 transitions needed
         learn_from(agent, log_as_arrays())
     assert agent.is_warming_up
     assert "learned" not in repr(agent)
     with pytest.warns(UserWarning, match="warming up"):
         evaluate(agent, RandomPlaces(), 1)
     learn_from(agent, log_as_arrays(), epochs=2)
+    # All 40 + 2 * 40: at its end, at transition 100, the warm-up is learned, too.
     assert "learned 120 steps" in repr(agent)
     evaluate(agent, RandomPlaces(), 1)  # without a warning
 

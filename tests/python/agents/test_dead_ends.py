@@ -107,6 +107,7 @@ def test_dead_ends_of_vectors_are_learned_as_terminated(agent_class, vector_clas
 
 @pytest.mark.parametrize("mode", ["NEXT_STEP", "SAME_STEP"])
 def test_dead_ends_of_vectors_that_reset_themselves_are_learned_as_terminated(mode, monkeypatch):
+    # Without this, the training would reset each environment of a SyncVectorEnv itself.
     monkeypatch.setattr("sdnn.training.vectors._resets_each", lambda env: False)
 
     class OtherVectorEnv(gym.vector.SyncVectorEnv):

@@ -234,6 +234,7 @@ def test_durations_are_learned_alike_from_all_vectors_and_autoreset_modes(mode, 
 
 
 def test_durations_are_learned_from_a_vector_that_resets_its_environments_itself(monkeypatch):
+    # Without this, the training would reset each environment of a SyncVectorEnv itself.
     monkeypatch.setattr("sdnn.training.vectors._resets_each", lambda env: False)
 
     class OtherVectorEnv(gym.vector.SyncVectorEnv):
@@ -364,6 +365,8 @@ def test_the_metadata_of_a_vectors_first_environment_decide_for_all(vector_class
 
 
 def test_a_missing_duration_of_an_episodes_last_step_is_looked_for_in_its_final_info(monkeypatch):
+    # The vector resets itself: at the end of an episode, after 50 steps, its info is that of the
+    # reset, which has no job, and that of the last step is in "final_info".
     monkeypatch.setattr("sdnn.training.vectors._resets_each", lambda env: False)
 
     class ForgettingTheLast(Courier):

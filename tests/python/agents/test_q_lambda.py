@@ -188,6 +188,7 @@ def test_a_few_discrete_states_have_exact_independent_values(tmp_path):
 
 @pytest.mark.parametrize(("n_states", "n_units"), [(1, 0), (2000, 0), (5, 40)])
 def test_a_single_or_many_states_or_a_set_number_of_units_are_coded_as_patterns(n_states, n_units):
+    # From 2 to 1,536 states would have a table instead, with as many units as there are states.
     agent = SDNNQLambda(
         gym.spaces.Discrete(n_states), gym.spaces.Discrete(2), seed=1,
         approximator=LinearSDNNConfig(n_pattern_units=n_units),
@@ -306,6 +307,7 @@ def test_inputs_that_become_relevant_later_are_added_also_after_loading(inputs, 
         assert len(left_out) + len(agent.inputs) == 5, "all variables"
         if agent.inputs not in inputs_after.values():
             inputs_after[n_steps] = agent.inputs
+    # Inputs that were left out are judged again after 2, 4, 8 ... times the steps of the warm-up.
     assert list(inputs_after) == [N_WARM_UP, 2 * N_WARM_UP]
     chosen, with_added = inputs_after.values()
     assert ("variable", [4]) not in chosen
@@ -318,6 +320,7 @@ def test_inputs_that_become_relevant_later_are_added_also_after_loading(inputs, 
 
 def test_an_rbf_network_keeps_the_inputs_that_its_warm_up_chose():
     unit, three = gym.spaces.Box(0.0, 1.0, (5,), np.float64), gym.spaces.Discrete(3)
+    # A Q(lambda) agent would add variable 4 after twice the steps of the warm-up, 800.
     agent = RBFQLearning(unit, three, inputs=[2], warm_up_steps=N_WARM_UP)
     for t, transition in enumerate(changing_task(seed=1, n_steps=850)):
         agent.learn(transition)

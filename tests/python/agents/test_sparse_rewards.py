@@ -35,16 +35,18 @@ def longest_run(actions):
 
 
 def test_random_actions_are_repeated_while_all_rewards_were_zero():
-    # Among 1,000 actions drawn of four, a run of 15 has a probability of 1000 / 4^14.
+    # Among 1,000 actions drawn of four, a run of 15 has a probability of 1000 / 4^14. A search
+    # takes each drawn action for 1 to m / 2 steps, where max_action_repeat is m, by default 100.
     no_rewards = [0.0] * 1000
     assert longest_run(act_and_learn(new_agent(), no_rewards)) >= 40
-    # Two repeated actions in a row may be the same.
-    assert longest_run(act_and_learn(new_agent(max_action_repeat=20), no_rewards)) < 2 * 20
+    # At most ten steps for each drawn action: 40 are at least four equal draws in a row.
+    assert longest_run(act_and_learn(new_agent(max_action_repeat=20), no_rewards)) < 4 * 10
     for learning in ({"max_action_repeat": 1}, {"epsilon": 0.0}):
         assert longest_run(act_and_learn(new_agent(**learning), no_rewards)) < 15
 
 
 def test_random_actions_are_not_repeated_in_discrete_spaces():
+    # With discrete states only, repeating an action leads in no direction.
     agent = SDNNQLambda(gym.spaces.Discrete(5), gym.spaces.Discrete(4), seed=1)
     actions = []
     for _ in range(500):
@@ -67,6 +69,7 @@ def test_transitions_of_a_log_do_not_count_as_steps_of_a_search(has_warm_up):
 
 
 def test_ends_of_episodes_are_counted_only_after_the_search():
+    # Each end that is counted halves the longest repetition of random actions.
     agent = new_agent()
     act_and_learn(agent, [0.0] * 10)
     # The first reward ends the search, and this episode is not counted.

@@ -523,7 +523,7 @@ def test_a_training_stopped_before_or_after_the_end_of_its_warm_up_resumes_exact
     stop_steps = (1, 150, 199, 200, 201, 350)
     finished = check_exact_resume(new_training, lambda: env, tmp_path / "t", stop_steps).agent
     assert not finished.is_warming_up
-    # The 200 transitions of the warm-up are learned at its end.
+    # The 200 transitions of the warm-up are learned at its end, as well as the other 300.
     assert finished.learning_report()["n_corrections"] > 480, "most of 500 steps"
 
 
@@ -649,7 +649,7 @@ class Unterminated(Corridor):
         (0.999, 1, Corridor, True, None),
         (0.999, 1, Unterminated, False, None),
     ],
-)  # warned after 2,000 steps in each environment, or never
+)  # 2,000 steps in each environment; none for discounts up to 0.998 or where an episode terminates
 def test_a_discount_near_1_is_warned_of_once_where_nothing_terminates(
     discount, n_environments, env_class, limit_bootstraps, warned_at, tmp_path
 ):

@@ -139,7 +139,7 @@ def test_a_store_with_another_schema_is_refused_before_any_query(tmp_path, state
         ("UPDATE rows SET kind = x'00'", "kind"),
         ("UPDATE rows SET step = 0.5", "step"),
         ("UPDATE rows SET length = length + 1", "rows"),
-        ("DELETE FROM rows WHERE number = 39", "rows"),
+        ("DELETE FROM rows WHERE number = 39", "rows"),  # the last of the training in progress
         ("UPDATE measurements SET content = 5", "measurements"),
         ("UPDATE measurements SET content = x'00'", "content"),
     ],

@@ -173,7 +173,7 @@ def test_gymnasiums_vector_wrappers_record_whole_episodes():
     envs = RecordEpisodeStatistics(gym.make_vec(ID, num_envs=2, config=LOW_GOAL))
     envs.reset()
     lengths = []
-    for _ in range(30):
+    for _ in range(30):  # twice 12 decisions and the step that resets, and four more
         *_, infos = envs.step(np.zeros((2, 1), np.float32))
         if "episode" in infos:
             lengths += infos["episode"]["l"].tolist()

@@ -102,6 +102,7 @@ def test_columns_are_limited():
         "b": RandomInverse(),
         "c": Symbolic(categories=("u", "v")),
     }
+    # After the categories a single column is free: "a" has it, and "b" and "c" are left out.
     low, _ = columns.add(codings, [{"a": 1.0, "b": 2.0}])
     assert len(low) == MOST_COLUMNS == len(columns.row({"b": 1.0, "c": 1}))
     assert columns.numbers == {"a": MOST_COLUMNS - 1}

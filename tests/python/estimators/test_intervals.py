@@ -129,15 +129,18 @@ def test_coverage_within_0_and_1_with_enough_samples_is_required():
 
 
 def test_half_widths_are_quantiles_of_the_last_errors_whose_level_follows_the_coverage():
+    # The level begins at the coverage 0.5. After each error but the first it rises by 0.02 * 0.5 if
+    # the error is beyond the half width, and falls by 0.02 * 0.5 if not. Half widths are the error
+    # of rank level * (n + 1), rounded up, among n.
     errors = FollowedErrors(0.5)
     assert errors.half_width() == 0.0
     for error in (1.0, 3.0):
-        errors.learn(error)  # 3 is beyond the half width 1: the level is 0.5 + 0.02 * 0.5
+        errors.learn(error)  # 3 is beyond the half width 1
     assert errors.level == pytest.approx(0.51)
     assert errors.half_width() == 3.0  # the second of two: 0.51 * 3 is rounded up
-    errors.learn(2.0)
+    errors.learn(2.0)  # within 3
     assert errors.level == pytest.approx(0.5)
-    assert errors.half_width() == 2.0
+    assert errors.half_width() == 2.0  # the second of three: 0.5 * 4
     for size in (5.0, 7.0):
         for _ in range(300):
             errors.learn(size)

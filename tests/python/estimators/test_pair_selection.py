@@ -123,6 +123,8 @@ def test_pairs_can_be_selected_with_a_column_of_hardly_any_values(coding, n_pres
 
 
 def test_features_of_many_samples_can_be_selected_with_a_column_of_a_single_value():
+    # More than 5,000 samples select features by default, with a part of them that may lack the only
+    # value of the last column.
     samples = np.random.RandomState(0).uniform(size=(5001, 3))
     targets = samples[:, 0].copy()
     samples[1:, 2] = np.nan
@@ -131,6 +133,7 @@ def test_features_of_many_samples_can_be_selected_with_a_column_of_a_single_valu
 
 
 def test_features_of_many_samples_can_be_selected_with_many_flipped_units():
+    # More than 5,000 samples select features by default.
     samples = np.random.RandomState(0).uniform(size=(5001, 3))
     options = {"n_pattern_units": 100, "max_iter": 1, "n_output_units": 10, "random_state": 0}
     # The small networks that select have 64 units per pattern, too few to flip 50 of each sign.

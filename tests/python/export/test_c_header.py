@@ -61,7 +61,9 @@ def test_actions_of_the_c_header_are_those_of_the_agent(name, target, tmp_path):
     [(1.0, 0.25, 2**21), (1.0, 2.0**-24, 0), (1e-30, 0.0, 0), (1e-30, 1.0, 2**62)],
 )
 def test_tie_tolerance_is_exported_in_integer_units_of_values(reward, tie_tolerance, expected):
-    # The value 1 is a sum of two weights of 23 bits: its unit is 2^-23, and 0.25 is 2^21 units.
+    # The value 1 is a sum of two weights of 23 bits: its unit is 2^-23, and 0.25 is 2^21 units. A
+    # tolerance of half a unit is rounded down to 0, and 2^62 is the most: in the unit of values of
+    # 1e-30, a tolerance of 1 would be above 2^120.
     rule = QLambdaConfig(tie_rule="lowest", tie_tolerance=tie_tolerance)
     agent = SDNNQLambda(Discrete(2), Discrete(2), learning=rule)
     agent.learn(Transition(0, 1, reward, 1, terminated=True))
@@ -271,6 +273,7 @@ def test_tables_of_actions_are_those_of_the_agent():
 def test_hidden_units_outside_all_windows_are_not_exported():
     agent = discrete_agent()
     header = c_header(agent, "policy")
+    # Windows of 20 of the 60 hidden units: those of the two actions lie at both ends.
     assert "40 hidden units in use" in header.text
     # A byte for each hidden unit and pattern unit of each ordered pair of four inputs.
     assert header.weight_bytes == 40 * (4 * 3) * SMALL.n_pattern_units

@@ -35,7 +35,9 @@ def test_greedy_actions_with_a_history_are_those_of_the_agent(name, kind, target
 
 @pytest.mark.parametrize("name", LEARNERS)
 def test_calls_in_any_order_continue_or_begin_the_episodes_of_the_agent(name, target, tmp_path):
-    # Few observations, so that equal ones follow each other; steps of all kinds in any order.
+    # Few observations, so that equal ones follow each other; steps of all kinds in any order. A
+    # line is its kind (an episode begins, a step to learn, a greedy action, one that begins a
+    # greedy episode), an observation, a reward, the next observation, and whether it is terminal.
     agent = LEARNERS[name]()
     header, command = build(tmp_path, agent, target, *SANITIZED)
     random = np.random.default_rng(1)
@@ -109,7 +111,7 @@ def test_nan_and_infinity_have_defined_actions(needs, tmp_path):
           for (step = 0; step < 625; ++step) {
             const double x[3] = {numbers[step % 5], numbers[step / 5 % 5], numbers[step / 25 % 5]};
             if (step % 25 == 0) policy_begin_episode(&episode);
-            if (policy_greedy_double(&episode, x) >= 11) return 1;
+            if (policy_greedy_double(&episode, x) >= 11) return 1; /* there are 11 actions */
           }
           return 0;
         }
@@ -129,6 +131,8 @@ def test_images_of_another_history_are_refused():
     image = save_image(agent)
     load_image(other, image)
     assert save_image(other) == image
+    # Only the warm-up differs, 100 steps instead of 150: other ranges of differences were fitted to
+    # it, with which the weights in the image would mean other states.
     shorter = SDNNQLambda(
         agent.observation_space, agent.action_space, history="differences", seed=1, angles=[2],
         inputs="all", angle_pairs=[], approximator=SMALL, warm_up_steps=100,

@@ -147,8 +147,9 @@ def test_a_weight_that_would_exceed_16_bits_is_not_learned(target, tmp_path):
           for (i = 0; i < n; ++i) {
             if (model.weights[i] != 32767) return 2;
           }
-          for (i = 0; i < n; ++i) model.weights[i] = 5; /* far from the bound that is known */
+          for (i = 0; i < n; ++i) model.weights[i] = 5; /* far from the known bound */
           if (!model_learn(&model, x, 0) || !model_learn(&model, x, 1)) return 3;
+          /* A bound at the limit is found anew, 5, and a correction raises it to 6. */
           return model.largest[0] + model.largest[1] > 6 + 32767;
         }
     """

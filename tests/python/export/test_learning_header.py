@@ -67,9 +67,11 @@ def test_an_agent_in_c_searches_for_a_first_reward_like_the_agent(target, tmp_pa
     agent = discrete()
     header, command = build(tmp_path, agent, target, *SANITIZED)
     lines = lines_of(agent, 1500, 5, header.fraction_bits)
-    n_rewards = (lines.shape[1] - 3) // 2 + 1
-    lines[:300, n_rewards] = 0
-    lines[300:, n_rewards] *= np.arange(len(lines) - 300) % 20 == 0
+    # A line is its kind, an observation of n numbers, the reward, the next observation, its end.
+    n = (lines.shape[1] - 3) // 2
+    rewards = lines[:, 1 + n]
+    rewards[:300] = 0
+    rewards[300:] *= np.arange(len(lines) - 300) % 20 == 0
     initial_image = save_image(agent)
     actions, image = run_program(command, initial_image, lines, agent.n_dimensions)
     assert actions == run_agent(agent, lines, header.fraction_bits)
@@ -77,11 +79,12 @@ def test_an_agent_in_c_searches_for_a_first_reward_like_the_agent(target, tmp_pa
 
 
 def test_an_endless_episode_in_c_has_the_excursions_of_the_agent(target, tmp_path):
+    # After 2,000 steps of an episode, some explorations are excursions: several worst actions.
     agent = discrete()
-    assert agent.learning.max_action_repeat > 1
+    assert agent.learning.max_action_repeat > 1  # else there are none
     header, command = build(tmp_path, agent, target, *SANITIZED)
     lines = lines_of(agent, 4000, 6, header.fraction_bits)
-    lines = np.concatenate([lines[:1], lines[lines[:, 0] == 1]])
+    lines = np.concatenate([lines[:1], lines[lines[:, 0] == 1]])  # a begin, then steps to learn
     lines[:, -1] = 0  # nothing terminates
     initial_image = save_image(agent)
     actions, image = run_program(command, initial_image, lines, agent.n_dimensions)
@@ -193,6 +196,9 @@ def test_weights_that_leave_their_range_are_halved(target, tmp_path):
     values = [round(agent.q_values(symbol)[0] * 2.0**10) for symbol in range(9)]
     symbol, value = min(enumerate(values), key=lambda pair: pair[1])
     assert value == -2 * (2**23 - 1)  # both of its inputs are -1 in the code
+    # Two lines, each with its kind, an observation, a reward, the next observation, and its end: an
+    # episode begins, and a step to learn is terminal. Its target is twice the value, and needs
+    # weights of twice the size.
     now, reward = np.eye(9, dtype="<i4")[symbol], 2 * value << header.fraction_bits - 10
     lines = np.concatenate([[0], now, [0], now, [0], [1], now, [reward], now, [1]], dtype="<i4")
     lines = lines.reshape(2, -1)

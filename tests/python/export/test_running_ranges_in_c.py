@@ -79,6 +79,8 @@ def test_an_image_brings_its_ranges_to_an_agent_that_chose_its_inputs():
     assert save_image(agents[0]) == save_image(agents[1])
 
 
+# From HEAD on come four counts of at most 2^40, four means from -1e140 to 1e140, and four sums of
+# squares, which are finite and not below 0.
 @pytest.mark.parametrize(
     ("place", "number"),
     [
