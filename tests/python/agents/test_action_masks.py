@@ -166,7 +166,8 @@ def test_targets_bootstrap_from_allowed_actions_only(agent_class):
 def test_a_training_with_masks_resumes_exactly(
     agent_class, actions, unbounded, stop_step, n_envs, tmp_path
 ):
-    # Masks of several earlier steps, or of the next one, are part of the state.
+    # Masks of several earlier steps, or of the next one, are part of the state. A warm-up has 60
+    # steps: the stops after 33 and, in three environments, 20 are within it, and 100 is after it.
     settings = {"n_steps": 3} if agent_class is SDNNQLearning else {"bootstrap": "sarsa"}
     learning = agent_class.learning_type(**settings)
 

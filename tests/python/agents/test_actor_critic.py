@@ -184,6 +184,7 @@ def test_traces_survive_alternating_environments_with_missing_values():
         transition = Transition(observation, action, 1.0, next_observation, False)
         agent.learn(transition, environment=environment)
         observations[environment] = next_observation
+    # If another environment's step ended them, traces would be those of one step: 0 and one size.
     traces = agent.state()["agent.trace.values"]
     assert len(np.unique(np.abs(traces))) > 3, "traces of several steps differ in size"
 

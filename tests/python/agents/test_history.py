@@ -100,6 +100,7 @@ def test_only_general_presets_without_codes_of_missing_values_find_a_history_by_
     def finds_history(agent_class, **settings):
         return agent_class(gym.make("Pendulum-v1"), **settings).finds_history
 
+    # A history of "auto" is found at the end of a warm-up. SDNN-C has none unless it is passed.
     assert finds_history(SDNNQLambda)
     assert not finds_history(SDNNQLambda, preset="paper", observation_range="adaptive")
     assert not finds_history(SDNNQLambda, missing="code")

@@ -84,6 +84,7 @@ def test_actions_of_any_space_are_imitated_at_any_size_of_rewards(agent_class, s
 
 def test_rewards_whose_squares_overflow_are_imitated_and_larger_returns_refused():
     agent, other = (SDNNQLambda(gym.spaces.Box(-1, 1, (2,)), gym.spaces.Discrete(3)) for _ in "ab")
+    # Returns may be up to 1e300, and the discounted sum of three such rewards is more.
     refuses("dataset", imitate, agent, [([0, 0], 1, 1e300, [0, 0], False)] * 3)
     assert agent.is_warming_up
     imitate(agent, [([0, 0], 1, 1e160, [0, 0], True)])

@@ -129,7 +129,7 @@ def test_excursions_resume_exactly_and_take_allowed_actions(when_saved, tmp_path
                 agent.learn(transition, environment=environment)
         return agent, n_in_excursions
 
-    # From step 4,000 on, both environments have excursions.
+    # From step 4,000 on, both environments have excursions, as each has had 2,000 steps.
     resumed, n_in_excursions = run_with_saves(new_agent(), range(4200, 4400, 10))
     assert n_in_excursions > 3  # of 20 saves
     assert states_equal(run_with_saves(new_agent(), ())[0], resumed)
@@ -145,7 +145,7 @@ def agent_with_excursions():
 def test_transitions_that_the_agent_did_not_act_in_are_learned_after_an_excursion():
     agent = agent_with_excursions()
     rng = np.random.default_rng(0)
-    for _ in range(2100):
+    for _ in range(2100):  # beyond the 2,000 steps before the first excursion
         observation, next_observation = rng.uniform(-1, 1, (2, 2))
         action = agent.act(observation)
         agent.learn(Transition(observation, action, rng.normal(), next_observation, False))

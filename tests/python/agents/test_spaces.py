@@ -54,7 +54,11 @@ ACTION_SPACES = [
     (Discrete(3), Discrete(3, start=1), False),
     (MultiDiscrete([2, 3]), MultiDiscrete([2, 3], start=[0, 1]), False),
 ]
-"""Spaces of an agent and of an environment, and whether the agent accepts the environment."""
+"""Spaces of an agent and of an environment, and whether the agent accepts the environment.
+
+Bounds of a Box must be the same, as others may be other units. All integers that an environment
+observes must be possible in a discrete space of the agent; discrete actions must be the same.
+"""
 
 
 @pytest.mark.parametrize(

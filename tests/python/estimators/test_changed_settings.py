@@ -98,9 +98,9 @@ def test_settings_may_become_those_that_the_network_has(estimator):
     model.set_params(coding=codings, pairs=model.pair_names_)
     model.set_params(n_pattern_units=model.network_.input_code.core.n_units)
     if estimator is SDNNRegressor:
-        model.set_params(n_output_units=280, output_range=model.output_range_)
+        model.set_params(n_output_units=280, output_range=model.output_range_)  # the default
     else:
-        model.set_params(n_units_per_class=60)
+        model.set_params(n_units_per_class=60)  # the default of few classes
     model.partial_fit(FRAME, LABELS)
 
 

@@ -42,7 +42,8 @@ def test_a_new_network_is_the_largest_that_fits_the_memory(ram_bytes, n_hidden):
     agent = new_agent(SPACE, TWO_ACTIONS, kind="sdnn-c", ram_bytes=ram_bytes, seed=3)
     sizes = agent.approximator
     assert (sizes.n_hidden_units, sizes.n_active_units) == (n_hidden, n_hidden // 3)
-    # Patterns of the preset `small` have 40 units; hidden units are added only to full patterns.
+    # Patterns of the preset `small` have 40 units; hidden units, in twelfths of its 900, are added
+    # only to full patterns.
     assert sizes.n_pattern_units == 40 if n_hidden > 75 else 15 <= sizes.n_pattern_units < 40
     assert c_header(agent, "agent", learning=True).ram_bytes <= ram_bytes
 
