@@ -95,6 +95,7 @@ def test_cartpole_is_balanced_for_300_steps_after_20_000_steps():
     env = gym.make("CartPole-v1")
     agent = SDNNActorCritic(env, seed=1)
     agent.train(env, steps=20_000, seed=1)
+    # Episodes have at most 500 steps, and about 20 with random actions.
     assert evaluate(agent, gym.make("CartPole-v1"), episodes=10, seed=7).mean_return > 300
 
 

@@ -124,5 +124,6 @@ class RewardAtGoal(gym.Wrapper):
 def test_mountain_car_is_learned_with_a_reward_at_the_goal_only():
     env = RewardAtGoal(gym.make("MountainCar-v0"))
     agent = SDNNQLambda(env, seed=1003)
+    # Actions drawn anew in each step hardly ever reach the goal: a car must swing to it.
     agent.train(env, steps=40_000, seed=1003)
     assert evaluate(agent, env, episodes=10, seed=7).mean_return > 0.8

@@ -75,6 +75,7 @@ def test_missing_readings_are_treated_bit_for_bit_as_in_python(make, missing, ta
     agent = make(missing)
     header, command = build(tmp_path, agent, target, *SANITIZED, "-DAGENT_REFUSES")
     lines = lines_of(agent, 1200, 7, header.fraction_bits)
+    # Few numbers are missing where observations that lack one are refused: most are learned.
     lines = with_missing(lines, np.random.default_rng(8), 0.03 if missing == "error" else 0.2)
     actions, image = run_program(command, save_image(agent), lines, agent.n_dimensions)
     assert actions == run_agent(agent, lines, header.fraction_bits)

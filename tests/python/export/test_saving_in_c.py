@@ -102,7 +102,9 @@ def test_parts_of_any_size_are_those_of_the_image(name, target, tmp_path):
 
 @pytest.mark.parametrize("make", [discrete, network, actor])
 def test_a_load_that_fails_leaves_the_agent_or_begins_a_new_one(make, target, tmp_path):
-    # Each reading fails in turn, or reads the image of another moment from some call on.
+    # An image is read twice in parts, to check it and to load it. Each call fails in turn, or reads
+    # the image of another moment from there on: from the first call on, that one is loaded. If the
+    # first reading fails, the agent stays as it is, image 1; if the second does, a new one begins.
     loaded, agent = trained(make, seed=2), trained(make)
     image = save_image(agent)
     load_image(agent, image)
