@@ -86,8 +86,8 @@ def max_pairs(env, **options):
 
 
 def test_more_than_32_inputs_form_1024_pairs_also_after_loading(tmp_path):
-    # The limit holds where inputs are selected, and beyond it: 36 * 35 ordered pairs of 36 inputs
-    # are more than 1,024, and 25 * 24 of 25 inputs are fewer.
+    # The limit holds only where inputs are selected and would form more pairs: 36 inputs have
+    # 36 * 35 ordered pairs, 25 inputs only 25 * 24.
     all_pairs = 0  # stands for no limit
     env = gym.wrappers.TimeLimit(Square(6, one_hot=True), 100)  # of 36 inputs
     assert max_pairs(env) == 1024

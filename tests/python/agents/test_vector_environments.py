@@ -378,7 +378,7 @@ def test_gymnasiums_batched_cartpole_is_learned_without_the_steps_of_its_automat
     ids=["resets itself", "without shared memory"],
 )
 def test_vectors_that_cannot_repeat_episodes_resume_with_new_ones_only(new_vector, tmp_path):
-    # Neither resets single environments: one has one seed, the other resets in the next step again.
+    # Neither can be reset one by one: one takes a single seed, the other's next step resets again.
     vector = new_vector()
     checkpoints = CheckpointCallback(tmp_path / "t", 1000)
     training = Training(sdnn_agent(), vector, steps=20, callbacks=[checkpoints])
