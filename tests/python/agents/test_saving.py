@@ -225,7 +225,7 @@ def test_an_unchanged_class_that_is_defined_again_replaces_the_first_but_a_chang
         first.load(tmp_path / "agent")
 
 
-@pytest.mark.parametrize("n_steps", [40, 60])
+@pytest.mark.parametrize("n_steps", [40, 60])  # within and at the end of a warm-up
 @pytest.mark.parametrize(
     "name", ["sdnn", "sdnn, vector", "fuzzy", "sdnn, switches", "sdnn, warm-up"]
 )
