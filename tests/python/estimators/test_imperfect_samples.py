@@ -49,6 +49,7 @@ def test_a_stream_of_constant_features_predicts_the_mean_until_one_varies(river)
 
 @pytest.mark.parametrize("options", [{"pairs": [(0, 1)]}, {"coding": [("anchor", [1])]}])
 def test_features_that_a_model_names_by_their_numbers_are_learned_while_constant(river, options):
+    # A stream leaves out features while they are constant, which would shift the numbers of others.
     model = river.RiverRegressor(SDNNRegressor(**SMALL, **options), grace_period=20)
     for a, y in X[:40].tolist():
         model.learn_one({"a": 1.0, "b": a, "c": -a}, y)

@@ -166,6 +166,7 @@ def test_images_with_extreme_numbers_are_refused_or_saved_again(make, target, tm
     images = []
     for _ in range(200):
         image = bytearray(save_image(agent))
+        # The first two words identify the agent: others become extreme.
         for place in 4 * random.integers(2, 70, random.integers(1, 4)):
             n_bytes = random.choice([1, 4, 8])
             image[place : place + n_bytes] = random.choice(words).tobytes()[:n_bytes]
