@@ -80,7 +80,8 @@ def ways_to_set(context: click.Context) -> dict[str, str]:
                 ways.setdefault(name, f"{option}=...")
             elif option in options:  # not every command has all options of `train`
                 ways.setdefault(name, option)
-        ways["environment"] = "the argument ENV_ID"
+        if any(parameter.name == "env_id" for parameter in context.command.params):
+            ways["environment"] = "the argument ENV_ID"
     return ways
 
 
@@ -95,8 +96,9 @@ def explained_option(error: click.NoSuchOption) -> click.UsageError:
 def error_of_set(key: str, expected: str) -> click.UsageError:
     """Return the error about a key that ``--set`` cannot set; it suggests what can be set."""
     ways = ways_to_set(click.get_current_context())
-    hint = advice(key.rpartition(".")[2], (), ways) or "such as learning.discount"
-    return click.UsageError(f"--set {key}: must be {expected}; {hint}")
+    hint = advice(key.rpartition(".")[2], (), ways)
+    hint = f"; {hint}" if hint else ", such as learning.discount"
+    return click.UsageError(f"--set {key}: must be {expected}{hint}")
 
 
 def option_words(error: ConfigError) -> str:
@@ -106,7 +108,8 @@ def option_words(error: ConfigError) -> str:
         name = error.key.rpartition(".")[2].replace("-", "_")
         intended = ways_to_set(click.get_current_context()).get(name, "--set")
         if not intended.startswith("--set"):  # the key is the name of a dedicated option
-            return f"{option}: unknown key; did you mean {intended}?"
+            possible = "".join(error.problem.partition("possible: ")[1:])
+            return f"{option}: unknown key; did you mean {intended}? {possible}".rstrip()
     return f"{option}: {error.problem}"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -169,8 +170,11 @@ class Fitted(Learned):
             "modifiers": [number_of[id(table)] for table in code.modifiers],
         }
         changed = changed_settings(self._begun_with, settings_of(self), plain_setting)
-        if changed:
-            begun_with = {name: json_value(self._begun_with[name]) for name in changed}
+        begun_with = {}
+        for name in changed:
+            with contextlib.suppress(TypeError):  # a function, which the estimator no longer has
+                begun_with[name] = json_value(self._begun_with[name])
+        if begun_with:
             description["begun_with"] = begun_with
         write_file(Path(path), "estimator", arrays, description)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
@@ -106,17 +107,23 @@ def changed_settings(begun_with: Settings, settings: Settings, meaning: Meaning)
     return [
         name
         for name, value in begun_with.items()
-        if not is_equal(settings[name], value)  # fast: it is called before each sample of a stream
+        if settings[name] is not value  # fast: it is called before each sample of a stream
+        and not is_equal(settings[name], value)
         and meaning(name, settings[name]) != meaning(name, value)
     ]
 
 
 def is_equal(first: object, second: object) -> bool:
-    """Return whether two values are equal by ``==``, which arrays of several values never are."""
+    """Return whether two values are equal, also arrays and lists of arrays; False if in doubt."""
+    if isinstance(first, np.ndarray) and isinstance(second, np.ndarray):
+        return np.array_equal(first, second)
     try:
         return bool(first == second)
-    except ValueError:
-        return False
+    except (TypeError, ValueError):  # lists of arrays, or pandas' NA
+        pass
+    if isinstance(first, list | tuple) and isinstance(second, list | tuple):
+        return len(first) == len(second) and all(map(is_equal, first, second))
+    return False
 
 
 def change_error(name: str, old: object, new: object, learner: str, remedy: str) -> Exception:
@@ -128,6 +135,8 @@ def change_error(name: str, old: object, new: object, learner: str, remedy: str)
 def require_settings_of_network(model: Estimator) -> None:
     """Raise ValueError if an estimator has other settings than its network, which is to learn."""
     settings = {name: getattr(model, name) for name in model._begun_with}
+    if all(map(operator.is_, settings.values(), model._begun_with.values())):
+        return  # nearly always, and fast
     meaning = functools.partial(setting_of_network, model)
     for name in changed_settings(model._begun_with, settings, meaning):
         if meaning(name, settings[name]) != settings_in_use(model).get(name):

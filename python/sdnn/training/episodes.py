@@ -11,8 +11,8 @@ import gymnasium as gym
 import numpy as np
 
 from sdnn.environments.spaces import allows_no_action
-from sdnn.environments.types import AnyEnv, Data, Element, Elements, Env, Info, Mask, Masks
-from sdnn.support.arguments import duration_of, flag, reward_of, shown
+from sdnn.environments.types import AnyEnv, Data, Element, Elements, Env, Info, Masks
+from sdnn.support.arguments import flag, reward_of, shown
 from sdnn.training.files import (
     MOST_RECENT,
     ActionLog,
@@ -30,7 +30,8 @@ from sdnn.training.interfaces import (
     Seeds,
     UnrepeatedEpisodeError,
     UnusableStepError,
-    missing_in_info,
+    duration_in,
+    mask_in,
     warn_of_endless_episode,
 )
 
@@ -49,24 +50,6 @@ def announces(env: object, what: str) -> bool:
     ``what`` is ``"action_masks"`` or ``"durations"``.
     """
     return bool((getattr(env, "metadata", None) or {}).get(what))
-
-
-def duration_in(info: Info) -> float:
-    """Return the duration of a step in an info; UnusableStepError if there is none."""
-    if "dt" not in info:
-        raise missing_in_info("dt", info)
-    try:
-        return duration_of(info["dt"])
-    except ValueError as error:
-        raise UnusableStepError(str(error)) from error
-
-
-def mask_in(info: Info) -> Mask:
-    """Return the mask in an info; UnusableStepError if there is none."""
-    if "action_mask" not in info:
-        raise missing_in_info("action_mask", info)
-    mask: Mask = info["action_mask"]
-    return mask
 
 
 def reset_env(env: AnyEnv, seed: Any, options: Options) -> tuple[Element, Info]:
@@ -133,7 +116,9 @@ class SingleEnvironment(EnvironmentAdapter):
     def take(self, action: Element) -> tuple[Element, float, bool, bool]:
         """Step the environment; return observation, reward, terminated and truncated."""
         observation, reward, terminated, truncated, info = step_env(self._env, self._copied(action))
-        reward, terminated, truncated = checked_outcome(reward, terminated, truncated)
+        is_usual = type(reward) is float and type(terminated) is bool is type(truncated)
+        if not (is_usual and math.isfinite(reward)):  # without a call in the usual case
+            reward, terminated, truncated = checked_outcome(reward, terminated, truncated)
         if self.masks is not None:
             self.masks = [None if terminated else mask_in(info)]
         if self.dts is not None:
@@ -167,9 +152,8 @@ class Episodes:
     """The episodes in all environments of a training: begins, steps and repeats them.
 
     ``seed`` is the root of the episodes' seeds; None: resets have no seeds. ``first`` is the number
-    of the first episode, from 0. Without ``limit_bootstraps`` truncated steps are learned as
-    terminated. ``unusable`` makes the error about a step or reset from its cause, and from the
-    environment, None if any may be the cause.
+    of the first episode, from 0. ``unusable`` makes the error about a step or reset from its cause
+    and from the environment, None if any may be the cause.
 
     Attributes
     ----------
@@ -200,13 +184,11 @@ class Episodes:
         learner: ObservingLearner,
         seed: int | None,
         first: int,
-        limit_bootstraps: bool,
         options: Callable[[int], Data | None],
         unusable: Callable[[Exception, int | None], UnusableStepError],
     ) -> None:
         self._env, self._seed, self.options = env, seed, options
         self._unusable, self._learner = unusable, learner
-        self._limit_bootstraps = limit_bootstraps
         self.adapter = adapter
         self.wrappers = learning_wrappers(env)
         self.learned: list[Statistics] = []
@@ -283,28 +265,32 @@ class Episodes:
 
     def is_over(self, environment: int) -> bool:
         """Return whether the last step has ended the episode of an environment."""
-        adapter = self.adapter
-        return adapter.terminated[environment] or adapter.truncated[environment]
+        return self.adapter.terminated[environment] or self.adapter.truncated[environment]
 
-    def terminal(self) -> list[bool]:
-        """Return in which environments the last step is learned without a value that follows it."""
-        if not any(self.adapter.truncated):
-            return self.adapter.terminated
-        return [self._is_terminal(i) for i in self._environments]
+    def terminal(self, limit_bootstraps: bool) -> list[bool]:
+        """Return in which environments the last step is learned without a value that follows it.
 
-    def _is_terminal(self, environment: int) -> bool:
-        """Return whether the last step terminated an episode, or counts as if it had.
-
-        A truncated step does so in a state in which no action is allowed, and everywhere unless
-        limits bootstrap.
+        These are steps that terminated an episode, those that truncated it in a state in which no
+        action is allowed, and unless ``limit_bootstraps`` all that truncated it.
         """
-        adapter = self.adapter
-        if adapter.terminated[environment] or not adapter.truncated[environment]:
-            return adapter.terminated[environment]
-        if not self._limit_bootstraps or adapter.masks is None:
-            return not self._limit_bootstraps
+        terminated, truncated = self.adapter.terminated, self.adapter.truncated
+        if not any(truncated):
+            return terminated
+        return [
+            terminated[i] or (truncated[i] and not (limit_bootstraps and self._can_act(i)))
+            for i in self._environments
+        ]
+
+    def _can_act(self, environment: int) -> bool:
+        """Return whether an action is allowed in the latest state of an environment."""
+        masks = self.adapter.masks
+        if masks is None:
+            return True
         space = getattr(self._env, "single_action_space", self._env.action_space)
-        return allows_no_action(space, "action_mask", adapter.masks[environment])
+        try:
+            return not allows_no_action(space, "action_mask", masks[environment])
+        except ValueError:  # the learner refuses the mask, or it has masks of another form
+            return True
 
     def note_learned(self, n: int) -> int:
         """Remove n environments from the beginning of `unlearned`; return the last of them.

@@ -21,12 +21,16 @@ from sdnn.training.episodes import (
     announces,
     checked_outcome,
     episode_seed,
-    mask_in,
     reset_env,
     step_env,
 )
 from sdnn.training.files import fixed_statistics
-from sdnn.training.interfaces import UnusableStepError, explained, warn_of_endless_episode
+from sdnn.training.interfaces import (
+    UnusableStepError,
+    explained,
+    mask_in,
+    warn_of_endless_episode,
+)
 
 _LONG = 100_000  # warn after this many steps in one episode; a chosen number
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 import inspect
+import math
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
@@ -13,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from sdnn._core import Controller
 from sdnn.config import fields_of
-from sdnn.environments.types import Array, Data, Element, Elements, Mask, Masks
-from sdnn.support.arguments import explains_names, shown
+from sdnn.environments.types import Array, Data, Element, Elements, Info, Mask, Masks
+from sdnn.support.arguments import duration_of, explains_names, shown
 from sdnn.support.habits import advice
 
 Seeds: TypeAlias = Mapping[int, int | None]
@@ -51,6 +52,27 @@ def missing_in_info(key: str, keys: Iterable[object], where: str = "info") -> Un
         f"{where} must have {key!r}{meaning}, as metadata[{_ANNOUNCED_BY[key]!r}] of env is True,"
         f" got {shown(sorted(map(str, keys)))}"
     )
+
+
+def duration_in(info: Info) -> float:
+    """Return the duration of a step in an info; UnusableStepError if there is none."""
+    if "dt" not in info:
+        raise missing_in_info("dt", info)
+    try:
+        dt = duration_of(info["dt"])
+    except ValueError as error:
+        raise UnusableStepError(str(error)) from error
+    if not math.isfinite(dt):
+        raise UnusableStepError(f"dt must be finite, got {dt}")
+    return dt
+
+
+def mask_in(info: Info) -> Mask:
+    """Return the mask in an info; UnusableStepError if there is none."""
+    if "action_mask" not in info:
+        raise missing_in_info("action_mask", info)
+    mask: Mask = info["action_mask"]
+    return mask
 
 
 class EnvironmentAdapter(abc.ABC):

@@ -2,8 +2,7 @@
 
 In each round the agent acts in all environments, these step together, and the agent learns the
 outcomes in the order of the environments. The loop pauses after a step that ends an episode, and
-where an evaluation or a callback is due. `TrainingLoop` is the loop; the adapters after it call the
-agent, in C++ or in Python.
+where an evaluation or a callback is due. The adapters after it call agents in C++ or in Python.
 """
 
 from __future__ import annotations
@@ -55,6 +54,7 @@ class TrainingLoop(abc.ABC):
     evaluate_every: int | None
     evaluate_every_episodes: int | None
     evaluation_episodes: int
+    limit_bootstraps: bool
     callbacks: Sequence[Any]
     n_steps = 0
     n_episodes = 0
@@ -169,7 +169,7 @@ class TrainingLoop(abc.ABC):
                 episodes.actions,
                 adapter.rewards,
                 episodes.observations,
-                episodes.terminal(),
+                episodes.terminal(self.limit_bootstraps),
                 adapter.truncated,
                 environments,
                 self._next_call - n_steps,  # the most steps to learn
@@ -223,7 +223,7 @@ class TrainingLoop(abc.ABC):
         )
         self.n_episodes += 1
         self._episodes.present[environment] = None
-        if self._episodes.terminal()[environment]:
+        if self._episodes.terminal(self.limit_bootstraps)[environment]:
             self._warning_step = 0  # the warning is for trainings in which nothing terminates
         if self.evaluate_every_episodes is not None and self._lacks_evaluation:
             self._learner.begin_episode(environment)  # so that pending n-step returns are learned

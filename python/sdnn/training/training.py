@@ -263,7 +263,6 @@ class Training(TrainingLoop):
             self._learner,
             self.seed,
             first,
-            self.limit_bootstraps,
             self._options,
             self._unusable,
         )

@@ -13,7 +13,7 @@ from numpy import ndarray
 
 from sdnn.environments.spaces import has_mask
 from sdnn.environments.types import Element, Elements, Info, Mask, VectorEnv
-from sdnn.support.arguments import array_of
+from sdnn.support.arguments import array_of, shown
 from sdnn.training.episodes import SingleEnvironment, announces, reset_env, step_env
 from sdnn.training.interfaces import (
     EnvironmentAdapter,
@@ -168,6 +168,8 @@ class _Vector(EnvironmentAdapter, abc.ABC):
             return [1.0] * self.n_environments
         self._require_key("dt", infos, needed)
         numbers = self._column("dt", np.where(needed, infos["dt"], 1.0), "fiu", "numbers")
+        if not np.isfinite(numbers).all():
+            raise UnusableStepError(f"dt must be finite, got {shown(numbers)}")
         return [float(number) for number in numbers]
 
     def _masks_in(self, infos: Info, needed: Sequence[bool]) -> list[Mask]:

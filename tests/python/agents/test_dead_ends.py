@@ -150,6 +150,33 @@ def test_an_agent_that_overrides_learn_receives_a_terminated_transition_without_
     assert [transition.next_mask for transition in transitions] == [[1, 1, 1], [1, 1, 1], None]
 
 
+def test_learners_in_python_may_have_masks_of_another_form():
+    masks = []
+
+    class Learner:
+        def begin_episode(self):
+            pass
+
+        def act(self, observation, explore=True, mask=None):
+            masks.append(mask)
+            return 0
+
+        def learn(self, transition):
+            masks.append(transition.next_mask)
+
+    class NamedActions(DeadEnds):
+        def reset(self, **options):
+            return super().reset(**options)[0], {"action_mask": "all"}
+
+        def step(self, action):
+            return *super().step(action)[:-1], {
+                "action_mask": "none" if self.n_steps == 3 else "all"
+            }
+
+    Training(Learner(), NamedActions("truncates"), episodes=1).run()
+    assert masks == ["all"] * 5 + ["none"]  # in turns for act and learn
+
+
 def test_evaluations_end_in_a_dead_end():
     evaluation = evaluate(new_agent(SDNNQLambda), DeadEnds("truncates"), episodes=2)
     assert evaluation.lengths.tolist() == [3, 3]

@@ -356,6 +356,33 @@ def test_an_error_about_a_missing_duration_names_the_environment_of_a_vector(vec
     envs.close()
 
 
+@pytest.mark.parametrize(
+    "vector_class", [None, gym.vector.SyncVectorEnv, gym.vector.AsyncVectorEnv]
+)
+def test_a_duration_of_nan_is_an_unusable_step_for_learners_in_python_too(vector_class):
+    class Learner:
+        n_environments = 1
+
+        def begin_episode(self):
+            pass
+
+        def act(self, observation, explore=True):
+            return 0
+
+        def learn(self, transition):
+            raise AssertionError("a step was learned")
+
+    class Timeless(Courier):
+        def step(self, action):
+            *outcome, info = super().step(action)
+            return *outcome, info | {"dt": np.nan}
+
+    env = Timeless() if vector_class is None else vector_class([Timeless])
+    with pytest.raises(UnusableStepError, match="dt must be finite"):
+        Training(Learner(), env, steps=10).run()
+    env.close()
+
+
 @pytest.mark.parametrize("vector_class", [gym.vector.SyncVectorEnv, gym.vector.AsyncVectorEnv])
 def test_the_metadata_of_a_vectors_first_environment_decide_for_all(vector_class):
     agent = agent_and_courier(SDNNQLambda)[0]

@@ -770,9 +770,12 @@ def test_without_limit_bootstraps_a_truncation_is_learned_as_a_termination():
 
     agents = RecordingAgent(), RecordingAgent()
     for agent, bootstraps in zip(agents, (True, False), strict=True):
-        Training(agent, Corridor(), episodes=1, limit_bootstraps=bootstraps).run()
-    assert agents[0].terminated == [False] * 8
-    assert agents[1].terminated == [False] * 7 + [True]
+        training = Training(agent, Corridor(), episodes=1, limit_bootstraps=bootstraps)
+        training.run()
+        training.episodes, training.limit_bootstraps = 2, not bootstraps  # of the second episode
+        training.run()
+    assert agents[0].terminated == [False] * 15 + [True]
+    assert agents[1].terminated == [False] * 7 + [True] + [False] * 8
 
 
 def test_a_training_in_pieces_of_0_seconds_yields_after_each_step_and_learns_as_usual():

@@ -114,6 +114,13 @@ def test_a_list_that_is_changed_in_place_is_a_change():
     refuses("output_range", model.learn_one, X[0], 0.5)
 
 
+def test_a_model_whose_function_of_columns_was_replaced_can_be_saved(tmp_path):
+    coding = [("anchor", lambda table: [0, 1, 2])]
+    model = SDNNRegressor(**{**OPTIONS, "coding": coding}).fit(X, Y)
+    loaded = saved_and_loaded(model.set_params(coding="anchor"), tmp_path)
+    np.testing.assert_array_equal(loaded.partial_fit(X, Y).n_iter_, 2)
+
+
 def test_settings_of_learning_stay_changeable():
     changes = {
         "max_iter": 2,
