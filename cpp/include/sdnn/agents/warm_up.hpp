@@ -55,8 +55,8 @@ class WarmUp {
   void set_n_environments(std::size_t n) {
     episodes_.resize(n, [this] { return Episode(n_dimensions_); });
   }
-  /// The number of environments that learning the stored transitions needs: that of now, or a larger
-  /// one if transitions are of environments that were removed since.
+  /// The number of environments that learning the stored transitions needs: that of now, or a
+  /// larger one if transitions are of environments that were removed since.
   std::size_t n_in_all() const {
     std::size_t n = n_environments();
     for (const std::int64_t i : environments_) n = std::max(n, static_cast<std::size_t>(i) + 1);
