@@ -99,7 +99,7 @@ def _types_of_fields(settings_class: type[object]) -> Mapping[str, Any]:
 
 
 def schemas_of(*classes: object) -> Values:
-    """Return the JSON Schemas of classes and their nested classes, by name."""
+    """Return JSON Schemas of classes and nested ones, by name. `PartSettings` are any tables."""
     _, schemas = msgspec.json.schema_components(
         classes, ref_template="#/$defs/{name}", schema_hook=lambda _: {"type": "object"}
     )

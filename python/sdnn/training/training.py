@@ -266,7 +266,7 @@ class Training(TrainingLoop):
             self._options,
             self._unusable,
         )
-        if reset_options is not None and self.n_environments > 1:
+        if reset_options is not None and not isinstance(adapter, SingleEnvironment):
             raise ValueError("reset_options must be None for a vector environment")
 
     @property

@@ -262,7 +262,12 @@ class _AutomaticResets(_Vector):
         self._after_resets: Elements | None = None
 
     def reset(self, seeds: Seeds, options: Options = None) -> dict[int, Element]:
-        """Return first observations; only the first call resets, later ones were automatic."""
+        """Return first observations; only the first call resets, others are automatic.
+
+        In mode ``SAME_STEP`` the resets came with the last step. In other modes they come with the
+        next one, so nothing is returned yet. ``options`` are always None, as for all vectors:
+        `Training` refuses them.
+        """
         if self._after_resets is None:
             observations, infos = reset_env(self._env, seeds[0], None)
             self._note_masks(infos, range(self.n_environments))

@@ -749,8 +749,9 @@ def test_reset_options_depend_on_the_number_of_the_episode():
     assert (env.numbers, evaluation_env.numbers) == ([1, 2, 3, 4], [2, 4])
 
 
-def test_reset_options_are_refused_with_a_vector():
-    envs = gym.vector.SyncVectorEnv([Corridor] * 2)
+@pytest.mark.parametrize("n_environments", [1, 2])
+def test_reset_options_are_refused_with_a_vector(n_environments):
+    envs = gym.vector.SyncVectorEnv([Corridor] * n_environments)
     refuses("reset_options", Training, corridor_agent(), envs, steps=9, reset_options=dict)
 
 

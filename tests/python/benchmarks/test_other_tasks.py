@@ -379,10 +379,13 @@ def test_stream_q_moves_parameters_along_the_gradient_of_the_value_of_the_action
     for step in range(200):
         action = agent.act(observation)
         next_observation, reward, *_ = env.step(action)
+        # After 20 steps weights and normalizations are no longer the initial ones.
         if step > 20 and agent._is_greedy:
             break
         agent.learn(Transition(observation, action, reward, next_observation, False))
         observation = next_observation
+    else:
+        pytest.fail("no greedy action")
     (network,), chosen = agent.networks, agent._chosen
     network.end_episode()  # without traces of earlier steps
     state, before = agent._state.copy(), network.parameters.copy()
@@ -395,6 +398,7 @@ def test_stream_q_moves_parameters_along_the_gradient_of_the_value_of_the_action
         network.parameters[parameter] += change
         return float(network.outputs(state)[chosen])
 
+    # All parameters move by the same factor, error / bound, times the gradient: equal ratios.
     largest = np.argsort(-np.abs(changes))[:20]
     gradient = [(value_with(i, 1e-3) - value_with(i, -1e-3)) / 2e-3 for i in largest]
     ratios = changes[largest] / gradient

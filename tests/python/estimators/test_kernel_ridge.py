@@ -179,7 +179,10 @@ def test_predictions_are_sums_of_the_analytic_kernel(pairs):
     frame = pd.DataFrame({"x": X[:, 0], "angle": 360 * X[:, 1], "kind": LABELS, "gaps": X[:, 3]})
     frame.loc[::7, "gaps"] = np.nan
     codings = [(Circular(period=360.0), ["angle"]), ("symbolic", ["kind"])]
-    # The powers of correlations of such a short scale are below the smallest number.
+    # `predict` sums the kernel of all pairs in the core, and that of listed pairs in NumPy; both
+    # must agree with the matrix of `kernel_`. Correlations of RandomInverse fall by a factor from
+    # bin to bin, whose powers the core uses. With this short scale they would underflow, and the
+    # core looks them up in a table; without this coding x has the default scale and powers.
     codings.append((RandomInverse(length_scale=0.001), ["x"]))
     for coding in codings, codings[:2]:
         model = SDNNKernelRidge(coding, pairs=pairs, inputs="all", degree=2, alpha=0.01)

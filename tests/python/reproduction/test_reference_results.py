@@ -218,6 +218,9 @@ def test_reports_show_reference_results_where_there_are_any(fake_results):
     assert "With more trials" not in without.page(picture).to_html("")
     assert without.to_json()["claims"][0]["with_more_trials"] is None
 
+    # Claim 2: the median of the final steps is at most 10 in s4 and in s6. It holds by the fake
+    # trials (3 to 7 steps), but the larger reference results overrule them: in s4 half of the
+    # trials take 4 steps and half 50, so that the median, 27, may as well be 4 or 50.
     half = measured("s4", 10 * [4] + 10 * [50])
     reference = [
         ReferenceResult(**vars(result), config_hash="", root_seed=7, rows_digests=())
@@ -230,11 +233,14 @@ def test_reports_show_reference_results_where_there_are_any(fake_results):
     claim_row = next(row for row in rows if row[0] == "2")
     *_, verdict, chance = claim_row
     assert verdict == "inconclusive"
-    assert chance.startswith("3")  # 37.7 %: at least six of ten trials are good
+    # 37.7 %: at least six of ten trials take 4 steps, each with probability 1/2, so that the median
+    # is at most 10. That is neither nearly always nor hardly ever: inconclusive.
+    assert chance.startswith("3")
     first = rows.index(claim_row) + 1
     of_checks = [(trials, ours, word) for *_, trials, ours, word, _ in rows[first : first + 2]]
     assert of_checks == [("20", "27 [4, 50]", "undecided"), ("20", "4 [4, 4]", "holds")]
     claim = next(result for result in report.to_json()["claims"] if result["number"] == 2)
+    # "verdict" is by the fake trials alone, "decided" by the reference results, too.
     assert (claim["verdict"], claim["decided"]) == ("holds", "inconclusive")
     page = report.page(picture).to_html("")
     assert "root seed 7" in page
