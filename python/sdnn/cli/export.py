@@ -171,7 +171,7 @@ def export(
             if fraction_bits is not None:
                 raise click.UsageError("--fraction-bits is for agents: an estimator has doubles")
             header = _write_estimator(model, path, name, learning, flash)
-            click.echo(_words(path, header, learning, {} if as_json else None))
+            click.echo(_description_of(path, header, learning, {} if as_json else None))
             return
         if source is None:
             agent = _new_agent(durations=durations, **options)
@@ -186,10 +186,10 @@ def export(
             raise click.ClickException(f"{place}{error}") from error
     if as_json:
         more = {"scaling": None if agent.scaling is None else agent.scaling.values()}
-        click.echo(_words(path, agent_header, learning, more))
+        click.echo(_description_of(path, agent_header, learning, more))
         return
-    words = _words(path, agent_header, learning)
-    click.echo(f"{words}, {agent_header.n_words:,} words of weights read per decision")
+    description = _description_of(path, agent_header, learning)
+    click.echo(f"{description}, {agent_header.n_words:,} words of weights read per decision")
     for line in _observed(agent):
         click.echo(line)
 
@@ -292,7 +292,7 @@ def _errors_of_options(name: str | None, **options: str) -> Iterator[None]:
         raise click.UsageError(f"{options[argument]} {problem}") from error
 
 
-def _words(
+def _description_of(
     path: Path, header: CHeader | EstimatorHeader, learning: bool, more: Data | None = None
 ) -> str:
     """Describe a header: in a line, or as JSON with the values ``more`` if these are not None.

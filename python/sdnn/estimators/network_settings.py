@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
@@ -135,8 +134,6 @@ def change_error(name: str, old: object, new: object, learner: str, remedy: str)
 def require_settings_of_network(model: Estimator) -> None:
     """Raise ValueError if an estimator has other settings than its network, which is to learn."""
     settings = {name: getattr(model, name) for name in model._begun_with}
-    if all(map(operator.is_, settings.values(), model._begun_with.values())):
-        return  # nearly always, and fast
     meaning = functools.partial(setting_of_network, model)
     for name in changed_settings(model._begun_with, settings, meaning):
         if meaning(name, settings[name]) != settings_in_use(model).get(name):

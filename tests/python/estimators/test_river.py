@@ -142,9 +142,9 @@ def test_adding_inputs_keeps_predictions_and_can_be_saved(river, tmp_path):
     rows = [{**x, "flag": float(x["flag"])} for x, _ in late_stream(50)]
     before = [model.fitted.predict_one(x) for x in rows]
     names = model.fitted.feature_names_in_.tolist()
-    words = model.fitted.codings_[names.index("word")]
-    more_words = WithMissing(base=Symbolic(categories=(*words.base.categories, "w")))
-    changes = {"new": WithMissing(base=UNIT).fit(X[:, 0], 40)}, {names.index("word"): more_words}
+    coding = model.fitted.codings_[names.index("word")]
+    larger = WithMissing(base=Symbolic(categories=(*coding.base.categories, "w")))
+    changes = {"new": WithMissing(base=UNIT).fit(X[:, 0], 40)}, {names.index("word"): larger}
     assert not grow(model.fitted, *changes, most_columns=100)
     assert grow(model.fitted, *changes, most_columns=2**20)
     assert [model.fitted.predict_one(x) for x in rows] == before
